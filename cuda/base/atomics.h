@@ -5,8 +5,8 @@
 
 #include "base/host_device.h"
 
-// Relaxed atomics for host and device. Each returns the value before. What they build is a sum, a
-// maximum or a set, so that the order in which threads come to them does not show.
+// Relaxed atomics for host and device. Each returns the previous value. They build only sums,
+// maxima and sets, so results do not depend on the order of threads.
 
 namespace ist::gpu {
 
@@ -31,7 +31,7 @@ IST_HD inline std::uint32_t atomic_exchange(std::uint32_t* at, std::uint32_t val
   return IST_GPU_OR_HOST(atomicExch(at, value), __atomic_exchange_n(at, value, __ATOMIC_RELEASE));
 }
 
-/// Adds the first lane's `count` to what a team's lanes share with others; the value before.
+/// Adds the first lane's `count` to a number that teams share, and returns its previous value.
 template <class Team>
 IST_HD std::uint32_t take(const Team& team, std::uint32_t* at, std::uint32_t count) {
   std::uint32_t first = 0;
@@ -39,7 +39,7 @@ IST_HD std::uint32_t take(const Team& team, std::uint32_t* at, std::uint32_t cou
   return team.broadcast(first, 0);
 }
 
-/// Place of this lane's item in a list to which the lanes with `adds` append one each.
+/// The index of this lane's item in a list to which each lane with `adds` appends one.
 template <class Team>
 IST_HD std::uint32_t append(const Team& team, bool adds, std::uint32_t* size) {
   int total = 0;
@@ -47,7 +47,7 @@ IST_HD std::uint32_t append(const Team& team, bool adds, std::uint32_t* size) {
   return total == 0 ? 0 : take(team, size, static_cast<std::uint32_t>(total)) + before;
 }
 
-/// Writes `value` if `expected` is there.
+/// Writes `value` if the current value is `expected`.
 IST_HD inline std::uint32_t atomic_replace(std::uint32_t* at, std::uint32_t expected,
                                            std::uint32_t value) {
 #ifdef __CUDA_ARCH__
@@ -79,8 +79,9 @@ IST_HD inline std::uint32_t atomic_max(std::uint32_t* at, std::uint32_t value) {
 #endif
 }
 
-/// Makes what this thread's team wrote before its last sync visible to who then reads what this
-/// thread stores atomically; and, after an atomic load, what was made visible so to this one.
+/// Release and acquire fence. Everything that this thread's team wrote before its last sync becomes
+/// visible to threads that read what this thread then stores atomically. After an atomic load, data
+/// published in this way is visible to this thread.
 IST_HD inline void publish() {
 #ifdef __CUDA_ARCH__
   __threadfence();
@@ -91,7 +92,7 @@ struct alignas(16) Words4 {
   std::uint32_t word[4];
 };
 
-/// A load that does not look into the multiprocessor's own cache.
+/// A load that bypasses the multiprocessor's own cache.
 IST_HD inline std::uint32_t load_fresh(const std::uint32_t* at) {
   return IST_GPU_OR_HOST(__ldcg(at), *at);
 }
@@ -105,13 +106,13 @@ IST_HD inline Words4 load_fresh(const Words4* at) {
 #endif
 }
 
-/// Writes a value that others may be reading.
+/// Writes a value that other threads may be reading.
 IST_HD inline void atomic_store(std::uint32_t* at, std::uint32_t value) {
   IST_GPU_OR_HOST(*static_cast<volatile std::uint32_t*>(at) = value,
                   __atomic_store_n(at, value, __ATOMIC_RELEASE));
 }
 
-/// Reads a value that others may be changing.
+/// Reads a value that other threads may be writing.
 IST_HD inline std::uint32_t atomic_load(const std::uint32_t* at) {
   return IST_GPU_OR_HOST(*static_cast<const volatile std::uint32_t*>(at),
                          __atomic_load_n(at, __ATOMIC_ACQUIRE));
@@ -127,7 +128,7 @@ IST_HD inline double atomic_load(const double* at) {
   return x;
 }
 
-/// Writes x if sign · x is less than what is there.
+/// Writes x if sign · x is less than sign times the current value.
 IST_HD inline void atomic_lower(double* at, double x, double sign) {
   std::uint64_t to;
   std::memcpy(&to, &x, sizeof to);

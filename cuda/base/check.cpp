@@ -7,7 +7,7 @@
 namespace ist::gpu {
 namespace {
 
-const char* way_out(cudaError_t status) {
+const char* advice_for(cudaError_t status) {
   switch (status) {
     case cudaErrorMemoryAllocation:
       return "free device memory, ask for fewer spheres, or bake on the CPU";
@@ -32,7 +32,7 @@ void check(cudaError_t status, const char* doing) {
   if (status == cudaSuccess) return;
   cudaGetLastError();  // clears the error if it is not sticky, or the next call would report it
   throw Error(std::string("GPU: ") + doing + ": " + cudaGetErrorString(status) + " (" +
-              cudaGetErrorName(status) + "): " + way_out(status));
+              cudaGetErrorName(status) + "): " + advice_for(status));
 }
 
 }  // namespace ist::gpu

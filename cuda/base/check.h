@@ -7,7 +7,7 @@
 
 namespace ist::gpu {
 
-/// The number of blocks of `each` items for so many items; at least one, as a grid may not be
+/// The number of blocks of `each` items for `items` items; at least one, since a grid must not be
 /// empty.
 inline unsigned blocks_for(std::size_t items, unsigned each) {
   return static_cast<unsigned>(std::max<std::size_t>((items + each - 1) / each, 1));

@@ -13,7 +13,7 @@
 
 namespace ist::gpu {
 
-/// An array in device memory, uninitialised, that lives and dies in the order of a queue's work.
+/// An uninitialised array in device memory, allocated and freed in the order of a queue's work.
 template <class T>
 class DeviceArray {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -41,7 +41,8 @@ class DeviceArray {
     check(cudaMemsetAsync(data_, value, bytes(), queue_->stream()), "filling device memory");
   }
 
-  /// Copies to the front of the array, or from it. `from` and `to` are in use until Queue::wait().
+  /// Copies to the front of the array, or from it. `from` and `to` must stay valid until
+  /// Queue::wait().
   void upload(std::span<const T> from) {
     if (from.empty()) return;
     check(cudaMemcpyAsync(data_, from.data(), from.size_bytes(), cudaMemcpyHostToDevice,

@@ -14,7 +14,7 @@ constexpr int kOldest = 75;  // compute capability; CUDA 13 has none older
 
 __global__ void any_kernel() {}  // all are compiled for the same architectures
 
-/// Success if this build has code for the device. Makes the device's context.
+/// Returns success if this build has code for the device. Creates the device's context.
 cudaError_t find_code_for(int device) {
   int previous = 0;
   cudaError_t status = cudaGetDevice(&previous);
@@ -29,7 +29,7 @@ std::string with_point(int capability) {
   return std::to_string(capability / 10) + "." + std::to_string(capability % 10);
 }
 
-/// Why device `device` cannot run this build's kernels; empty if it can.
+/// The reason why device `device` cannot run this build's kernels; empty if it can.
 std::string obstacle(int device) {
   int count = 0;
   const cudaError_t found = cudaGetDeviceCount(&count);

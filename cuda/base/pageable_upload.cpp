@@ -13,9 +13,10 @@
 namespace ist::gpu {
 namespace {
 
-constexpr std::size_t kPiece = std::size_t{2} << 20;   ///< [bytes] carried, then fetched
-constexpr std::size_t kGrain = std::size_t{1} << 17;   ///< [bytes] that a thread carries at once
-constexpr std::size_t kLittle = std::size_t{1} << 20;  ///< [bytes] not worth it
+constexpr std::size_t kPiece = std::size_t{2} << 20;  ///< [bytes] staged, then fetched
+constexpr std::size_t kGrain = std::size_t{1} << 17;  ///< [bytes] that a thread copies at once
+constexpr std::size_t kLittle = std::size_t{1}
+                                << 20;  ///< [bytes] smaller uploads are left to the driver
 
 /// Memory of the context's pool of pinned memory, for the current device; null if there is none.
 std::byte* pinned_memory(cudaStream_t stream, std::size_t bytes) {
@@ -43,7 +44,7 @@ std::byte* pinned_memory(cudaStream_t stream, std::size_t bytes) {
 PageableUpload::PageableUpload(Queue& queue, std::size_t bytes) : queue_(queue) {
   if (bytes < kLittle) return;
   pinned_ = pinned_memory(queue.stream(), bytes);
-  // In stream order only is the memory ours: an upload before may still read it.
+  // The memory is free only in stream order: an earlier upload may still read it.
   if (pinned_ != nullptr) queue.wait();
 }
 

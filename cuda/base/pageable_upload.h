@@ -6,20 +6,20 @@
 
 namespace ist::gpu {
 
-/// Copies from the host's pageable memory to the device, in the order of the queue's stream: all
-/// threads carry the bytes into pinned memory, piece by piece, while the card fetches the pieces
-/// before; the driver alone does it with one thread. The pinned memory is that of the CUDA
-/// context's own pool and stays there for the next upload. Where there is no such pool, and for
-/// little, the driver copies.
+/// Copies from the host's pageable memory to the device, in the order of the queue's stream. All
+/// threads copy the bytes into pinned memory, piece by piece, while the device fetches earlier
+/// pieces; the driver alone would use one thread. The pinned memory belongs to the CUDA context's
+/// pool and stays there for the next upload. Without such a pool, and for small uploads, the driver
+/// copies.
 class PageableUpload {
  public:
-  /// `bytes`: of all copies together.
+  /// `bytes`: the total of all copies.
   PageableUpload(Queue& queue, std::size_t bytes);
   ~PageableUpload();
   PageableUpload(const PageableUpload&) = delete;
   PageableUpload& operator=(const PageableUpload&) = delete;
 
-  /// `from` may be used again on return if there is pinned memory, else after Queue::wait().
+  /// On return `from` may be reused if there is pinned memory, else after Queue::wait().
   void copy(void* to, const void* from, std::size_t bytes);
 
  private:

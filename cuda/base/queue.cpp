@@ -11,7 +11,7 @@
 namespace ist::gpu {
 namespace {
 
-/// The device's default memory pool. What a bake gives back stays in the pool for the next one.
+/// The device's default memory pool. Memory that a bake frees stays in the pool for the next bake.
 class DevicePool final : public DeviceMemoryResource {
  public:
   explicit DevicePool(int device) {
@@ -59,7 +59,8 @@ Queue::Queue(const GpuSettings& settings, bool waits)
     int least = 0, greatest = 0;
     check(cudaDeviceGetStreamPriorityRange(&least, &greatest),
           "querying the GPU's stream priorities");
-    const int priority = waits ? least : std::max(least - 1, greatest);  // less comes first
+    const int priority =
+        waits ? least : std::max(least - 1, greatest);  // a smaller number is a higher priority
     check(cudaStreamCreateWithPriority(&stream_, cudaStreamNonBlocking, priority),
           "making a stream");
     own_stream_ = true;

@@ -8,7 +8,7 @@
 
 namespace ist::gpu {
 
-/// Makes a device current, and the previous one again at the end.
+/// Makes a device current, and restores the previous one at the end.
 class DeviceGuard {
  public:
   explicit DeviceGuard(int device);
@@ -20,13 +20,12 @@ class DeviceGuard {
   int previous_ = 0;
 };
 
-/// The stream that a backend's device work runs on, in order, and where its memory comes from. One
-/// a backend; not shared by threads. The device it was made for must be current (DeviceGuard)
-/// wherever it is used.
+/// The stream on which a backend's device work runs in order, and the source of its memory. One per
+/// backend; not shared by threads. Its device must be current (DeviceGuard) wherever it is used.
 class Queue {
  public:
-  /// `waits`: where other queues have work to do at the same time, it comes first, if the stream is
-  /// the queue's own. Throws Error if the device cannot be used.
+  /// `waits`: the work of other queues takes precedence, if the stream is this queue's own. Throws
+  /// Error if the device cannot be used.
   explicit Queue(const GpuSettings& settings, bool waits = false);
   ~Queue();
   Queue(const Queue&) = delete;
@@ -35,7 +34,7 @@ class Queue {
   cudaStream_t stream() const { return stream_; }
   int multiprocessors() const { return multiprocessors_; }
 
-  /// Throws Error if there is no memory left. 0 bytes: nullptr.
+  /// Throws Error if memory is exhausted. Returns nullptr for 0 bytes.
   void* allocate(std::size_t bytes);
   void deallocate(void* memory, std::size_t bytes) noexcept;
 

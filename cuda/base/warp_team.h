@@ -8,9 +8,9 @@
 
 namespace ist::gpu {
 
-// The least, the largest and the sum (modulo 2^32) of the integers that the 32 threads of a warp
-// hold, for each of them. Compute capability 8.0 has an instruction for it; before that they are
-// exchanged in five steps. The order does not matter to integers: both give the same.
+// The minimum, maximum and sum (modulo 2^32) of one integer from each of a warp's 32 threads, for
+// all of them. Compute capability 8.0 has an instruction for it; older devices exchange values in
+// five steps. Both give the same results, since the order does not matter for integers.
 
 constexpr unsigned kWholeWarp = 0xFFFFFFFFu;
 
@@ -71,7 +71,7 @@ struct WarpTeam {
   __device__ float min(float value) const { return from_ordered_bits(min(ordered_bits(value))); }
   __device__ float max(float value) const { return from_ordered_bits(max(ordered_bits(value))); }
   __device__ std::uint64_t min(std::uint64_t value) const {
-    // The high words first; the low words of the lanes with the least.
+    // Reduces the high words, then the low words of the lanes with the least high word.
     const auto high = static_cast<std::uint32_t>(value >> 32);
     const auto low = static_cast<std::uint32_t>(value);
     const std::uint32_t least = min(high);
@@ -84,7 +84,7 @@ struct WarpTeam {
   __device__ int sum(int value) const {
     return static_cast<int>(warp_sum(static_cast<std::uint32_t>(value)));
   }
-  /// In one fixed order.
+  /// Sums in a fixed order.
   __device__ double sum(double value) const {
     return warp_exchange(value, [](double a, double b) { return a + b; });
   }
@@ -115,7 +115,7 @@ struct WarpTeam {
   }
 };
 
-/// A thread of the device alone.
+/// A single thread of the device.
 struct LaneTeam : SerialTeam {
   static constexpr int kBatch = 8;
 };

@@ -16,8 +16,8 @@ namespace {
 
 class CudaBackend final : public SolidBackend {
  public:
-  /// `is_second`: there is one already, whose work comes first. `tree`: the solid's, if that has
-  /// it.
+  /// `is_second`: there is another backend, whose work comes first. `tree`: the solid's, if
+  /// present.
   CudaBackend(const MeshSolid& solid, const GpuSettings& settings, bool is_second = false,
               const WideTree* tree = nullptr)
       : solid_(solid),
@@ -71,7 +71,7 @@ class CudaBackend final : public SolidBackend {
   bool leaves_threads_idle() const override { return true; }
 
  private:
-  /// The mesh's hierarchy, made when it is first needed: the grids have none.
+  /// The mesh's hierarchy, built at the first use: the grids have none.
   const WideTree& tree() {
     if (tree_ == nullptr) tree_ = &mesh_.emplace(queue_, solid_.arrays()).tree();
     return *tree_;

@@ -11,8 +11,8 @@
 #include "query/base/pair_place.h"
 #include "query/contact/contact_numbers.h"
 
-// The answers of a batch. A row has the same members as the arrays that it goes to (GpuPenetrations
-// …).
+// The answers of a batch. A row has the same members as the arrays that it is written to
+// (GpuPenetrations …).
 
 namespace ist::gpu {
 

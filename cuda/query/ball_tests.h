@@ -104,7 +104,7 @@ class BallTests {
   IST_HD MetView<Id> met() const {
     return {m_.met.balls, m_.met.triangles, m_.met.of_ball, held_, pairs_};
   }
-  /// Drops what the caller has taken: the pairs, and at the `end` of a part the balls too.
+  /// Drops what the caller has taken: the pairs and, at the `end` of a part, the balls too.
   IST_HD void forget(bool end) {
     pairs_ = 0;
     held_ = end ? 0 : held_;
@@ -244,9 +244,9 @@ class BallTests {
   const Source source_;
   PartSums& sums_;
   int held_ = 0, pairs_ = 0;
-  std::uint32_t met_[kItemsALane];  ///< triangles that meet an item's ball and wait to be listed
+  std::uint32_t met_[kItemsALane];  ///< triangles that meet an item's ball and are to be listed
   bool two_ = false, first_ = false, last_ = false;  ///< of the block under test
-  bool tests_ = false, lists_ = false;               ///< something waits
+  bool tests_ = false, lists_ = false;               ///< work is pending
 };
 
 }  // namespace ist::gpu

@@ -35,7 +35,7 @@ struct BatchCounters {
   std::uint32_t taken;
   std::uint32_t splits, tasks, entries, tasks_taken;
   std::uint32_t handed_out;               ///< pairs that may have left tasks, and leave no more
-  std::uint32_t detailed, details_taken;  ///< pairs that are asked at several levels of detail
+  std::uint32_t detailed, details_taken;  ///< pairs that need several levels of detail
 };
 
 /// The input and output of a batch, in memory of the device, or of the host in tests. Separations
@@ -67,7 +67,7 @@ struct BatchArrays : SolidPairs {
   std::uint32_t* entries_b;
   std::uint32_t split_capacity, task_capacity, entry_capacity;
   std::uint32_t most_alone;     ///< pairs of leaves that a descent meets before it is split
-  std::uint32_t task_weight;    ///< the least of a task, as task_floor() counts
+  std::uint32_t task_weight;    ///< the minimum of a task, as task_floor() counts
   std::uint32_t size_capacity;  ///< pairs in the list of a size; 0: one list for all
 
   /// Chooses how finely pairs are split. A small batch is split so that all warps have work until

@@ -39,8 +39,8 @@ __global__ void __launch_bounds__(32 * kDetailWarps) sum_detailed_pairs(const Ba
   });
 }
 
-/// Takes pairs from the list or, once it is empty, a task; waits for one as long as pairs in
-/// progress may create tasks. Returns its position and the number taken. Called by a warp's first
+/// Takes pairs from the list or, once it is empty, a task. Waits for a task as long as pairs in
+/// progress may create some. Returns its position and the number taken. Called by a warp's first
 /// lane.
 __device__ std::uint32_t take(const BatchArrays& batch, std::uint32_t listed, std::uint32_t most,
                               bool& is_task, std::uint32_t& at) {
@@ -62,8 +62,8 @@ __device__ std::uint32_t take(const BatchArrays& batch, std::uint32_t listed, st
   }
 }
 
-/// Sums pairs, and then the tasks that pairs have left, in one loop. So the code of the traversal
-/// exists once and stays in the instruction cache.
+/// Sums pairs, and then the tasks that pairs have left, in one loop, so that the code of the
+/// traversal exists once and stays in the instruction cache.
 __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchArrays batch) {
   __shared__ WorkMemory memories[kWarps];
   const WarpTeam team;

@@ -10,8 +10,8 @@
 #include "query/lod/level_pair.h"
 
 // The steps of a batch of pairs of trees, for the threads and warps of kernels and for tests on the
-// host. An answer depends on its pair and on how finely the batch is split (BatchArrays::cut_for())
-// alone, neither on other pairs nor on which team sums what.
+// host. An answer depends only on its pair and on how finely the batch is split
+// (BatchArrays::cut_for()), neither on other pairs nor on which team sums what.
 
 namespace ist::gpu {
 
@@ -157,7 +157,6 @@ IST_HD inline void list_pair(const BatchArrays& batch, std::uint32_t i, std::uin
   batch.list[std::uint64_t{size} * batch.size_capacity + at] = i;
 }
 
-/// The k-th listed pair.
 IST_HD inline std::uint32_t listed_pair(const BatchArrays& batch, std::uint32_t k) {
   if (batch.size_capacity == 0) return batch.list[k];
   std::uint32_t size = 0;
@@ -214,7 +213,7 @@ IST_HD inline std::uint32_t weight_of(const PairMemory& memory, int entry) {
   return 1u << 2 * (left < kMostLeft ? left : kMostLeft);
 }
 
-/// The approximate number of tasks of a pair: no more than get their own warps in a small batch.
+/// The approximate number of tasks of a pair, no more than get their own warps in a small batch.
 constexpr std::uint32_t kTasksOfPair = 12;
 
 /// Chooses the size of the tasks for pending entries: at least batch.task_weight, and not too many.
@@ -325,7 +324,6 @@ IST_HD inline int look_for_task(const BatchArrays& batch, std::uint32_t k, std::
   return k < tasks && k < batch.task_capacity ? -1 : 0;
 }
 
-/// A pair of the list and its place.
 struct PlacedPair {
   PairPlace place;
   std::uint32_t pair;  ///< in the batch
@@ -337,7 +335,7 @@ struct PlacedPair {
 constexpr int kPlacedAhead = 2;
 
 /// The state of a team that sums pairs and tasks. It is not in registers, since the traversal needs
-/// them all.
+/// all of them.
 struct WorkMemory : PairMemory {
   bool is_task;
   bool hand_out;       ///< of a pair: if large, it may leave tasks to other teams
@@ -410,8 +408,8 @@ IST_HD inline bool end_task(const BatchArrays& batch, WorkMemory& memory) {
   return true;
 }
 
-/// Sums the current task, or the current pair except what it leaves to tasks. The team that
-/// finishes a pair's last part writes the answer.
+/// Sums the current task, or the current pair except for the part that it leaves to tasks. The team
+/// that finishes a pair's last part writes the answer.
 template <class Team>
 IST_HD void do_work(const Team& team, const BatchArrays& batch, WorkMemory& memory) {
   load_trees(team, batch, memory.pair, memory);

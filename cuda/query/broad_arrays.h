@@ -12,7 +12,6 @@ struct CUstream_st;
 
 namespace ist::gpu {
 
-/// The constant part of a body.
 struct BroadBody {
   SolidBox box;  ///< scaled
   double wider;  ///< [u] on each side
@@ -114,7 +113,6 @@ inline void place_broad(Parts& parts, BroadArrays& of) {
 std::size_t broad_scratch_bytes(const BroadArrays& scene);
 /// Sets the constant indices.
 void ready_broad(const BroadArrays& scene, CUstream_st* stream);
-/// Launches one step.
 void launch_broad(const BroadArrays& scene, CUstream_st* stream);
 
 }  // namespace ist::gpu

@@ -23,7 +23,7 @@ struct Raw {
 template <class Work, class GoesOn>
 __device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& work,
                          const GoesOn& goes_on) {
-  if (count == 0) return;  // thousands of warps need not ask the one counter
+  if (count == 0) return;  // no need for thousands of warps to query one counter
   const WarpTeam team;
   for (;;) {
     std::uint32_t k = count;

@@ -20,7 +20,7 @@ struct FilledMemory {
   FilledBall ball[2][kMostFilled];
 };
 
-/// The overlap of two assets as estimated by a quick look at their coarsest levels, A's unit frame.
+/// A coarse estimate of the overlap of two assets from their coarsest levels, A's unit frame.
 struct QuickLook {
   double volume;
   PoseSlope slope;
@@ -52,7 +52,7 @@ class QuickLooker {
       const double d[3] = {b.x[0] - a.x[0], b.x[1] - a.x[1], b.x[2] - a.x[2]};
       const double reach = a.r + b.r, step = a.r > b.r ? a.r - b.r : b.r - a.r;
       double distance = sqrt((d[0] * d[0] + d[1] * d[1]) + d[2] * d[2]);
-      // A ball inside the other counts as one that touches it from inside.
+      // A ball inside the other is treated as one that touches it from inside.
       distance = distance > step ? distance : step;
       if (!(distance < reach)) continue;
       distance = distance > kLeastDistance ? distance : kLeastDistance;
@@ -157,9 +157,9 @@ class DetailSums {
       m_.result.clear();
     }
     double slope = 0,
-           sure_slope = 0;  // derivatives of the blend by the coarse sum and by the quick look
+           sure_slope = 0;  // derivatives of the blend by the coarse sum and by the coarse estimate
     // The coarse sum comes first, then the CPU's order of additions. A single call of ask() serves
-    // all of them, since several would not fit the instruction cache.
+    // all of them: several would not fit the instruction cache.
     IST_ROLLED
     for (std::size_t i = blends ? size + 1 : 1; i-- > 0;) {
       const bool estimates = i == size;

@@ -33,7 +33,7 @@ struct DiscMemory {
   BallTriangle<Id> cut[kCutCapacity];
 };
 
-/// Source: as BallTests has it.
+/// Source: as described at BallTests.
 template <class Team, class Source>
 class DiscSums {
  public:

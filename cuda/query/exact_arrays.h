@@ -17,30 +17,29 @@ namespace ist::gpu {
 /// The passes of a batch. The first works in rounds, with as many teams as the device runs. Pairs
 /// that need more memory go to the later passes, which have fewer teams with more memory each.
 constexpr int kExactPasses = 3;
-/// [bytes] of a team's memory beside that for the largest mesh.
+/// [bytes] of a team's memory without that for the largest mesh.
 IST_HD constexpr std::size_t exact_bytes(int pass) {
   return pass == 0 ? 80u << 10 : pass == 1 ? 512u << 10 : 16u << 20;
 }
 
-/// The state of a pair.
 enum class ExactState : std::uint32_t {
   ok,
   nothing,        ///< answered, but the volume may be 0: do the solids touch?
   unsure,         ///< doubles do not decide
   out_of_memory,  ///< the team's memory does not suffice
-  later,          ///< the round's memory is used up
-  wrong,          ///< signs contradict each other
+  later,          ///< the round's memory is full
+  wrong,          ///< signs are inconsistent
 };
 
 /// A round of the first pass. Its steps are small kernels: they place pairs, search for triangles
-/// that may cross, sum by signs in doubles and, where these do not decide, by exact signs. Pairs
+/// that may cross, sum by signs in doubles and, if these do not decide, by exact signs. Pairs
 /// without volume are searched for faces that touch. A round ends when the memory for triangles is
-/// used up.
+/// full.
 struct ExactRound {
   std::uint32_t first, count;                       ///< of the listed pairs
   std::uint32_t searched, summed, redone, touched;  ///< of these pairs, taken so far
   std::uint32_t found;                              ///< finished searches
-  std::uint32_t unsure, nothing;                    ///< of them
+  std::uint32_t unsure, nothing;                    ///< how many of them
   std::uint32_t chunks;                             ///< taken
 };
 
@@ -53,7 +52,7 @@ struct ExactCounters {
 };
 
 /// Pairs of triangles (16 · block + lane) in the order in which they were found. A chain of chunks
-/// holds those of one pair of solids.
+/// stores those of one pair of solids.
 struct ExactChunk {
   static constexpr std::uint32_t kPairs = 64;
   std::uint32_t pair[kPairs][2];
@@ -73,15 +72,15 @@ struct ExactFrame {
   PairPlace place;
   exact::Point aside;
   double moved[2];  ///< bound of how far a point of each surface is from its true place
-  double touch;     ///< solids that are as near touch
-  float reach[2];   ///< boxes that are as near are opened, in A's frame and in B's
+  double touch;     ///< solids within this distance touch
+  float reach[2];   ///< boxes within this distance are opened, in A's frame and in B's
   float pad[2];     ///< rounding of A's boxes in B's frame, and of B's in A's
   float slack;      ///< rounding of slabs
 };
 
 /// The parts of a pair's sums that decide whether the solids touch, A's unit frame.
 struct ExactLeft {
-  double volume, error;  ///< the volume below 0 by rounding alone
+  double volume, error;  ///< a volume below 0 is rounding alone
   double push;           ///< no less than the force's length
 };
 
@@ -104,8 +103,8 @@ struct CrossedRef {
   std::uint16_t inside;  ///< a bit for each local vertex
   std::uint16_t of_b;
   std::uint32_t pierced[2];  ///< bit 3 · lane + edge, in two words
-  /// For each edge, entries less exits: 2^16 times their total, plus those nearer to its first
-  /// corner. Modulo 2^32, so that lanes may add in any order.
+  /// For each edge, 2^16 times its entries less its exits, plus the same count over the half nearer
+  /// to its first corner. Modulo 2^32, so that lanes may add in any order.
   std::uint32_t edge[3 * kWidth];
 
   IST_HD std::uint64_t all_pierced() const { return std::uint64_t{pierced[1]} << 32 | pierced[0]; }
@@ -193,7 +192,7 @@ struct ExactArrays : SolidPairs {
 };
 
 // Candidates that exact batches keep for each pair from call to call: all pairs of triangles that a
-// search may find until B has moved by more than a margin.
+// search may find before B has moved by more than a margin.
 
 /// The motion of B relative to A: that of its box's centre, and that of the rotation per distance
 /// from the centre. A's unit frame.

@@ -10,8 +10,8 @@
 
 namespace ist::gpu {
 
-/// How far B may move before a search could find candidates that the list of a former one lacks.
-/// A's unit frame; rounding of floats is included.
+/// How far B may move before a search could find candidates that an older list lacks. A's unit
+/// frame; includes the rounding of floats.
 struct ExactAhead {
   float centre[3];  ///< of B's box
   float shift;      ///< bound of the centre's motion
@@ -76,7 +76,7 @@ class ExactBoxes {
     return meets;
   }
 
-  /// Writes a side's node as meet() takes it. `l`: its lane.
+  /// Writes a side's node in the form that meet() reads. `l`: its lane.
   IST_HD void keep(int side, MeshNode node, std::uint32_t l, const Box& box, ExactBox& out) const {
     const int level = node.level();
     const std::uint32_t n = node.number();
@@ -170,14 +170,15 @@ class ExactBoxes {
       n.x[k] = std::fma(u[l], v[m], -(u[m] * v[l]));
     }
     n.x[3] = -std::fma(n.x[0], p[0], std::fma(n.x[1], p[1], n.x[2] * p[2]));
-    // The error has the motion of points, as in by_plane(), their placement in float, and rounding.
+    // The error includes the motion of points, as in by_plane(), their placement in float, and
+    // rounding.
     const float moved = 0.5f * pair_.slack;
     longest += moved;
     farthest += moved;
     if constexpr (kAhead) farthest += 2 * ahead;
     out.margin() = longest * (12 * moved * (2 * farthest + longest) + 4e-6f * longest * farthest);
-    // Planes that separate by more than the margin still do after the motion. What floats leave
-    // open doubles decide.
+    // Planes that separate by more than the margin still do after the motion. Doubles decide the
+    // rest.
     if constexpr (kAhead)
       out.margin() +=
           1.00001f * ahead * std::sqrt(n.x[0] * n.x[0] + n.x[1] * n.x[1] + n.x[2] * n.x[2]);

@@ -12,7 +12,7 @@
 #include "query/exact/no_volume.h"
 #include "query/exact/overlap_formulas.h"
 
-// How two solids without common volume touch, as find_contact() has it on the CPU.
+// How two solids without common volume touch: find_contact() of the CPU.
 
 namespace ist::gpu {
 
@@ -44,7 +44,7 @@ IST_HD_COLD bool come_within(double distance, const CornerView& view) {
 }
 
 /// True if a lane's triangles are within `distance` of one plane and face each other. Either
-/// triangle's plane will do, since that of a sliver may be any.
+/// triangle's plane may be used, since that of a sliver is arbitrary.
 IST_HD inline bool flush(double distance, const CornerView& view) {
   exact::Point normal[2];
   bool level = false;
@@ -64,7 +64,7 @@ IST_HD inline bool flush(double distance, const CornerView& view) {
 }
 
 /// Tests the next `count` queued pairs of triangles for contact. False if two cross wherever points
-/// move within the tolerance: then they overlap, however little.
+/// move within the tolerance: then the solids overlap, however little.
 template <class Team>
 IST_HD bool touch_triangles(const Team& team, const ExactPair& of, ExactContactMemory& memory,
                             std::uint32_t first, std::uint32_t count, bool& touches) {

@@ -15,7 +15,6 @@ IST_HD_COLD bool nearly_cross(const CornerView& view, const exact::Point& aside,
   return cross_pair<Signs::settled>(view, aside, end, tolerance) != PairSays::apart;
 }
 
-/// Keeps no crossings.
 struct KeepNone {
   IST_HD bool operator()(bool, const std::uint32_t (&)[2], const PiercingEdge (&)[2],
                          const exact::EdgeEnd (&)[2]) {

@@ -11,8 +11,8 @@
 
 namespace ist::gpu {
 
-/// Tells if all or none of the blocks below a lane of a level are inside. `inside` has a bit for
-/// each block.
+/// Tests whether all or none of the blocks below a lane of a level are inside. `inside` has a bit
+/// for each block.
 IST_HD inline void look_below(const std::uint32_t* inside, const MeshTree& mesh, int level,
                               std::uint32_t number, bool& all, bool& none) {
   const std::uint32_t shift = 4 * static_cast<std::uint32_t>(level - 1);
@@ -253,7 +253,7 @@ class ExactInsides {
       const auto apex = static_cast<std::uint32_t>(exact::apex_of(exact::length_bound(corner[0]),
                                                                   exact::length_bound(corner[1]),
                                                                   exact::length_bound(corner[2])));
-      // The count says if the middle of the edge opposite to the apex is inside.
+      // The count shows whether the middle of the edge opposite to the apex is inside.
       const std::uint32_t k = (apex + 1) % 3, edge = 3 * t + k;
       const int count =
           static_cast<int>(record.inside >> block.corner[k][t] & 1) + record.near_first(edge);

@@ -22,7 +22,7 @@ constexpr double kMostKeptSteps = 6, kLeastKeptSteps = 1.5;
 /// per batch.
 IST_HD inline void look_at_kept(const ExactKept& kept, std::uint32_t i, const MeshTree& a,
                                 const MeshTree& b, const Similarity& now) {
-  // Margins of some steps, within fractions of a triangle's side, as KeptRing has them on the CPU.
+  // Margins of some steps, within fractions of a triangle's side, as in KeptRing on the CPU.
   constexpr double kLeast = 0.05, kMost = 0.3;
   KeptHead& head = kept.head(i);
   const bool known =

@@ -19,7 +19,7 @@ constexpr unsigned kWholeThreads = 32 * kWholeWarps;
 constexpr int kSearchBlocks = 6, kKeepBlocks = 5, kSumBlocks = 4, kExactBlocks = 2,
               kWholeBlocks = 4, kTouchBlocks = 5;
 
-/// Lists the pairs for which sift(i): those whose boxes intersect.
+/// Lists the pairs for which sift(i) is true: those whose boxes intersect.
 template <class Sift>
 __device__ void sift_pairs(const ExactArrays& batch, const Sift& sift) {
   const WarpTeam team;
@@ -144,7 +144,7 @@ __global__ void __launch_bounds__(kWholeThreads, kWholeBlocks)
 unsigned blocks_of(const ExactArrays& batch, unsigned warps, int grid) {
   return std::min(blocks_for(batch.pairs.count, warps), static_cast<unsigned>(grid));
 }
-/// The same, and whose teams of a pass find memory.
+/// The same, limited to the teams of a pass that have memory.
 unsigned blocks_with_memory(const ExactArrays& batch, int pass, std::size_t bytes, unsigned warps,
                             int grid) {
   const std::size_t all = bytes / (warps * batch.bytes_of_team(pass));

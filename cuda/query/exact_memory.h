@@ -55,7 +55,7 @@ struct ExactTriangle {
   Quad low, high;  ///< its box, that of A widened by the slack
   Quad plane;      ///< x · normal + last is a point's height times twice the area
 
-  /// Larger heights have a certain sign, wherever points move within the tolerance.
+  /// Heights above this have a certain sign, wherever points move within the tolerance.
   IST_HD float& margin() { return low.x[3]; }
   IST_HD float margin() const { return low.x[3]; }
   /// The lane in its block and, a byte each, the positions of its corners there.
@@ -64,13 +64,12 @@ struct ExactTriangle {
 };
 static_assert(sizeof(ExactBox) % 32 == 16 && sizeof(ExactTriangle) % 32 == 16);
 
-/// The memory of a team that searches, beside the pair.
+/// The memory of a team that searches, without the pair's.
 struct ExactSearchMemory {
   static constexpr std::uint32_t kWaiting = 192;  ///< pending pairs of nodes in the first pass
   ExactBox boxes[2][kWidth];           ///< the nodes of each side that may intersect the other
   ExactTriangle triangles[2][kWidth];  ///< the triangles of each side that may intersect the other
-  float vertices[3][2]
-                [kWidth];  ///< of two blocks, A's frame: lanes read them from banks of their own
+  float vertices[3][2][kWidth];  ///< of two blocks, A's frame: lanes read them from separate banks
   std::uint64_t waiting[kWaiting];
   ExactPool pool;
   ExactChain crossing,
@@ -96,7 +95,7 @@ struct ExactSum {
   };
 };
 
-/// The memory of a team that sums, beside the pair.
+/// The memory of a team that sums, without the pair's.
 struct ExactSumMemory {
   union {
     CornerMemory corners;

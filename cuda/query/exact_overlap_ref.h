@@ -14,10 +14,9 @@
 
 namespace ist::gpu {
 
-/// Two triangles that cross.
 struct CrossingRef {
   exact::Point from[2], offset[2];  ///< of an end (exact::EdgeEnd)
-  double way[2];              ///< the end's position on the edge, from its first corner: 0 to 1
+  double share[2];            ///< the end's position on the edge, from its first corner: 0 to 1
   std::uint32_t triangle[2];  ///< A's, B's: 16 · block + lane
   std::uint32_t end[2];       ///< the edge; 4: B's; 8: `from` is its first corner
 };
@@ -46,7 +45,7 @@ struct KeepCrossings {
     for (int e = 0; e < 2; ++e) {
       out.from[e] = at[e].from;
       out.offset[e] = at[e].offset;
-      out.way[e] = at[e].from_second ? 1 - at[e].share : at[e].share;
+      out.share[e] = at[e].from_second ? 1 - at[e].share : at[e].share;
       out.triangle[e] = pair[e];
       out.end[e] = end[e].edge | end[e].of_b << 2 | (at[e].from_second ? 0u : 8u);
     }
@@ -179,7 +178,7 @@ class OverlapRef {
     return {of.triangle[of_b], code & 3, of_b != 0, code >= 8,
             static_cast<std::uint32_t>(e) != of_b};
   }
-  IST_HD double way_of(std::uint32_t i, int e) const { return crossing(i).way[e]; }
+  IST_HD double share_of_edge(std::uint32_t i, int e) const { return crossing(i).share[e]; }
   IST_HD exact::Point place_of(std::uint32_t i, int e) const { return place_from(i, e, origin_); }
 
   // Records of both sides share one numbering.
@@ -268,7 +267,6 @@ class OverlapRef {
   }
 
  private:
-  /// Calls work(l) for `count` pieces.
   template <class Work>
   IST_HD void for_each_lane(std::uint32_t count, const Work& work) {
     for (std::uint32_t l = lane(); l < count; l += width()) work(l);

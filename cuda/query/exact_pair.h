@@ -10,7 +10,6 @@
 
 namespace ist::gpu {
 
-/// The signs that decide a pair.
 enum class Signs {
   doubles,
   settled,  ///< doubles that stay the same wherever points move within the tolerance
@@ -20,14 +19,14 @@ enum class PairSays : std::uint32_t {
   apart,
   crosses,
   unsure,  ///< the signs do not decide
-  wrong,   ///< signs contradict each other
+  wrong,   ///< signs are inconsistent
 };
 
 /// Arrays that lanes index differently. As local arrays they would be in slow memory.
 struct CornerMemory {
   double x[2][3][3][32];                    ///< A's, B's; of a corner
   double value[2][3][32], error[2][3][32];  ///< heights above the other's plane
-  std::uint32_t asked[9];                   ///< exact signs that lanes ask for, a bit for each lane
+  std::uint32_t wanted[9];                  ///< exact signs that lanes need, a bit for each lane
 };
 
 /// A lane's part of CornerMemory.
@@ -98,14 +97,14 @@ IST_HD inline std::uint32_t edges_through(std::uint32_t above) {
 }
 
 /// The signs of the volumes spanned by an edge of A and one of B, at bit 3 · A's + B's.
-struct WaysRound {
-  std::uint32_t asked = 0, known = 0, positive = 0;
+struct EdgeOrientations {
+  std::uint32_t wanted = 0, known = 0, positive = 0;
 };
 /// Computes the signs for edges that cross the other's plane.
 template <Signs kBy>
-IST_HD WaysRound ways_round(const CornerView& pair, const std::uint32_t (&through)[2],
-                            const exact::Point& aside, double tolerance) {
-  WaysRound ways;
+IST_HD EdgeOrientations edge_orientations(const CornerView& pair, const std::uint32_t (&through)[2],
+                                          const exact::Point& aside, double tolerance) {
+  EdgeOrientations orientations;
   IST_ROLLED
   for (int n = 0; n < 9; ++n) {
     const int i = n / 3, j = n % 3;
@@ -119,28 +118,29 @@ IST_HD WaysRound ways_round(const CornerView& pair, const std::uint32_t (&throug
       moved = 6 * tolerance * (of_a * of_b + size * (of_a + of_b));
     }
     const int sign = exact::FilteredPlane(u, v, aside).height(between, moved).sign;
-    ways.asked |= 1u << n;
-    ways.known |= (sign != 0 ? 1u : 0u) << n;
-    ways.positive |= (sign > 0 ? 1u : 0u) << n;
+    orientations.wanted |= 1u << n;
+    orientations.known |= (sign != 0 ? 1u : 0u) << n;
+    orientations.positive |= (sign > 0 ? 1u : 0u) << n;
   }
-  return ways;
+  return orientations;
 }
 
 /// If the triangles cross, finds the edges at the start and end of their common segment: A's edge
 /// leaves B at the start and enters it at the end, B's edge enters A at the start. `above`: for A's
 /// corners and B's.
 IST_HD inline PairSays find_ends(const std::uint32_t (&above)[2], const std::uint32_t (&through)[2],
-                                 const WaysRound& ways, PiercingEdge (&end)[2]) {
+                                 const EdgeOrientations& orientations, PiercingEdge (&end)[2]) {
   int count[2] = {0, 0};
   IST_ROLLED
   for (std::uint32_t n = 0; n < 6; ++n) {
     const std::uint32_t s = n / 3, k = n % 3;
-    const std::uint32_t all = s == 0 ? 7u << 3 * k : 0b1001001u << k, bits = ways.positive & all;
+    const std::uint32_t all = s == 0 ? 7u << 3 * k : 0b1001001u << k,
+                        bits = orientations.positive & all;
     // Two different signs prove that the edge misses the triangle, whatever the third is.
     if (((s == 0 ? through[0] : through[1]) >> k & 1) == 0 ||
-        (bits != 0 && bits != (ways.known & all)))
+        (bits != 0 && bits != (orientations.known & all)))
       continue;
-    if ((ways.known & all) != all) return PairSays::unsure;
+    if ((orientations.known & all) != all) return PairSays::unsure;
     const bool down = ((s == 0 ? above[0] : above[1]) >> k & 1) != 0;  // enters the other solid
     const bool at_end = down == (s == 0);
     ++(at_end ? count[1] : count[0]);
@@ -165,20 +165,21 @@ IST_HD PairSays cross_pair(const CornerView& pair, const exact::Point& aside,
   }
   if ((unknown[0] | unknown[1]) != 0) return PairSays::unsure;
   const std::uint32_t through[2] = {edges_through(above[0]), edges_through(above[1])};
-  return find_ends(above, through, ways_round<kBy>(pair, through, aside, tolerance), end);
+  return find_ends(above, through, edge_orientations<kBy>(pair, through, aside, tolerance), end);
 }
 
-/// Calls work(lane, item) → bool for each item whose bit is set in a lane's `asks`. All lanes share
-/// these calls, since few calls by single lanes take as long as many. Returns this lane's results.
+/// Calls work(lane, item) → bool for each item whose bit is set in a lane's `wanted`. All lanes
+/// share these calls, since a few calls by single lanes take as long as many. Returns this lane's
+/// results.
 template <int kItems, class Team, class Work>
-IST_HD std::uint32_t ask_together(const Team& team, CornerMemory& memory, std::uint32_t asks,
+IST_HD std::uint32_t ask_together(const Team& team, CornerMemory& memory, std::uint32_t wanted,
                                   const Work& work) {
-  if (!team.any(asks != 0)) return 0;
+  if (!team.any(wanted != 0)) return 0;
   std::uint32_t all = 0;
   IST_ROLLED
   for (int n = 0; n < kItems; ++n) {
-    const std::uint32_t lanes = team.ballot((asks >> n & 1) != 0);
-    if (team.lane() == 0) memory.asked[n] = lanes;
+    const std::uint32_t lanes = team.ballot((wanted >> n & 1) != 0);
+    if (team.lane() == 0) memory.wanted[n] = lanes;
     all += static_cast<std::uint32_t>(count_bits(lanes));
   }
   team.sync();
@@ -188,10 +189,10 @@ IST_HD std::uint32_t ask_together(const Team& team, CornerMemory& memory, std::u
     bool yes = false;
     if (std::uint32_t k = first + lane; k < all) {
       int n = 0;
-      std::uint32_t lanes = memory.asked[0];
+      std::uint32_t lanes = memory.wanted[0];
       while (k >= static_cast<std::uint32_t>(count_bits(lanes))) {
         k -= static_cast<std::uint32_t>(count_bits(lanes));
-        lanes = memory.asked[++n];
+        lanes = memory.wanted[++n];
       }
       for (; k > 0; --k) lanes &= lanes - 1;
       yes = work(lowest_bit(lanes), n);
@@ -200,10 +201,10 @@ IST_HD std::uint32_t ask_together(const Team& team, CornerMemory& memory, std::u
     std::uint32_t before = 0;
     IST_ROLLED
     for (int n = 0; n < kItems; ++n) {
-      const std::uint32_t lanes = memory.asked[n];
+      const std::uint32_t lanes = memory.wanted[n];
       const std::uint32_t k =
           before + static_cast<std::uint32_t>(count_bits(lanes & ((1u << lane) - 1))) - first;
-      if ((asks >> n & 1) != 0 && k < 32) out |= (found >> k & 1) << n;
+      if ((wanted >> n & 1) != 0 && k < 32) out |= (found >> k & 1) << n;
       before += static_cast<std::uint32_t>(count_bits(lanes));
     }
   }
@@ -235,18 +236,19 @@ IST_HD PairSays cross_exactly(const Team& team, bool has, const CornerView& pair
     (s == 0 ? above[0] : above[1]) = bits;
   }
   const std::uint32_t through[2] = {edges_through(above[0]), edges_through(above[1])};
-  WaysRound ways;
-  if (has) ways = ways_round<Signs::doubles>(pair, through, aside, 0);
-  ways.positive |= ask_together<9>(team, memory, ways.asked & ~ways.known, [&](int lane, int n) {
-    const CornerView of = {memory, lane};
-    const int i = n / 3, j = n % 3;
-    const exact::Point p = of.corner(0, i), r = of.corner(1, j);
-    return exact::exact_determinant(r, p, of.corner(0, (i + 1) % 3), p, of.corner(1, (j + 1) % 3),
-                                    r, 1, aside)
-               .sign > 0;
-  });
-  ways.known = ways.asked;
-  return has ? find_ends(above, through, ways, end) : PairSays::apart;
+  EdgeOrientations orientations;
+  if (has) orientations = edge_orientations<Signs::doubles>(pair, through, aside, 0);
+  orientations.positive |= ask_together<9>(
+      team, memory, orientations.wanted & ~orientations.known, [&](int lane, int n) {
+        const CornerView of = {memory, lane};
+        const int i = n / 3, j = n % 3;
+        const exact::Point p = of.corner(0, i), r = of.corner(1, j);
+        return exact::exact_determinant(r, p, of.corner(0, (i + 1) % 3), p,
+                                        of.corner(1, (j + 1) % 3), r, 1, aside)
+                   .sign > 0;
+      });
+  orientations.known = orientations.wanted;
+  return has ? find_ends(above, through, orientations, end) : PairSays::apart;
 }
 
 }  // namespace ist::gpu

@@ -102,7 +102,7 @@ IST_HD void patch_pass(const Team& team, const ExactPatchArrays& batch, int pass
     state = sum_marked(team, batch, i, work, memory.pair, memory.sum, work.pool, crossing, near,
                        visits, crossings);
     if (state == ExactState::ok || state == ExactState::nothing) {
-      team.sync();  // one lane has written what is left
+      team.sync();  // one lane has written ExactLeft
       const ExactLeft left = memory.sum.left;
       const exact::Point origin = memory.sum.origin;
       const bool touching =

@@ -11,8 +11,8 @@
 
 namespace ist::gpu {
 
-/// Appends a pair of triangles from each lane that `adds`, in the order of lanes. Beyond the pool's
-/// capacity pairs are only counted, so that the next round knows what it needs.
+/// Appends a pair of triangles from each lane that `adds`, in the order of lanes. Pairs beyond the
+/// pool's capacity are only counted, so that the next round knows its need.
 template <class Team>
 IST_HD void append(const Team& team, const ExactPool& pool, ExactChain& chain, bool adds,
                    std::uint32_t a, std::uint32_t b) {
@@ -73,8 +73,8 @@ IST_HD inline Apart apart_by_plane(const ExactPair& of, int side, const std::uin
 }
 
 /// Tests the next `count` queued pairs of triangles. Keeps those that no plane separates, and those
-/// whose signs might differ if points moved within the tolerance. This is a function of its own,
-/// since the search needs its registers.
+/// whose signs might differ if points moved within the tolerance. A separate function, since the
+/// search needs its registers.
 template <class Team>
 IST_HD void sift_triangles(const Team& team, const ExactPair& of, ExactSearchMemory& memory,
                            std::uint32_t first, std::uint32_t count) {
@@ -146,7 +146,6 @@ class WaitingTriangles {
   std::uint32_t head_ = 0, count_ = 0;
 };
 
-/// Empties the lists of found triangles.
 template <class Team>
 IST_HD void begin_sifting(const Team& team, ExactSearchMemory& memory, const ExactPool& pool) {
   if (team.lane() != 0) return;
@@ -282,7 +281,7 @@ class ExactSearch {
     return side == 0 ? before_a : before_b;
   }
 
-  // No array is indexed differently by lanes: it would be in slow memory.
+  // Arrays must not be indexed differently by lanes: they would be in slow memory.
   IST_HD MeshNode node_of(int side) const { return side == 0 ? node_[0] : node_[1]; }
   IST_HD bool opened(int side) const { return side == 0 ? opens_[0] : opens_[1]; }
 
@@ -336,7 +335,7 @@ class ExactSearch {
       // Most pairs of blocks are rejected here.
       const std::uint32_t lanes = team_.ballot(meets);
       if (Team::kWidth == kBoth && (lanes >> kWidth == 0 || lanes << kWidth == 0)) break;
-      // Boxes of both sides hold how far their points may move.
+      // Boxes of both sides include how far their points may move.
       float ahead = 0;
       if constexpr (Boxes::kAhead)
         ahead = side == 0 ? memory_.boxes[1][j].normal.x[3] : memory_.boxes[0][i].normal.x[3];

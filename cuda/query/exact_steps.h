@@ -237,7 +237,6 @@ IST_HD inline void leave_to_next(const ExactArrays& batch, int pass, std::uint32
     write_nothing(batch.answers, i, QueryStatus::budget_exhausted);
 }
 
-/// The counters of the n-th round.
 IST_HD inline ExactRound& round_of(const ExactArrays& batch, std::uint32_t n) {
   return batch.counters->round[n % 2];
 }
@@ -254,9 +253,9 @@ IST_HD inline std::uint32_t end_of(const ExactRound& round) {
   return round.first + searched_of(round);
 }
 
-/// Estimates if round n has memory for one more pair. Each pair in progress may take as many chunks
-/// as one of the last round did or, in the first round, as one that is finished. Teams that begin
-/// at the same time do not see each other's chunks, so each counts the teams `before` it.
+/// Estimates whether round n has memory for one more pair. Each pair in progress may take as many
+/// chunks as one of the last round did or, in the first round, as one that is finished. Teams that
+/// begin at the same time do not see each other's chunks, so each counts the teams `before` it.
 IST_HD inline bool goes_on(const ExactArrays& batch, std::uint32_t n, std::uint32_t before) {
   constexpr std::uint32_t kLeastChunks = 4;
   const ExactRound &last = round_of(batch, n + 1), &round = round_of(batch, n);
@@ -280,7 +279,7 @@ IST_HD void end_search(const Team& team, const ExactArrays& batch, ExactRound& r
   const ExactPool& pool = memory.pool;
   const bool fits = all && held(pool, memory.crossing) && held(pool, memory.near);
   query.state = fits ? ExactState::ok : ExactState::out_of_memory;
-  // A pair for which others have left no chunks is listed again.
+  // A pair for which no chunks were left is listed again.
   if (!fits && round.chunks > batch.pool.capacity) {
     query.state = ExactState::later;
     batch.list[0][atomic_add(&batch.counters->listed[0], 1) % batch.pairs.count] = query.pair;
@@ -291,7 +290,6 @@ IST_HD void end_search(const Team& team, const ExactArrays& batch, ExactRound& r
   atomic_add(&round.found, 1);
 }
 
-/// Searches the k-th pair of a round.
 template <class Team>
 IST_HD void search_query(const Team& team, const ExactArrays& batch, ExactRound& round,
                          std::uint32_t k, ExactPair& pair, ExactSearchMemory& memory) {

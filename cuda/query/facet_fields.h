@@ -220,8 +220,8 @@ class FacetWalk {
   bool goes_on_ = true;
   std::uint32_t block_ = 0;                   ///< the current block
   bool first_ = false;                        ///< it has not been tested
-  bool seen_ = false;                         ///< the triangles of a box are, for all blocks
-  FacetSource::Near near_;                    ///< triangles that may come near it
+  bool seen_ = false;                         ///< the triangles of a box are staged, for all blocks
+  FacetSource::Near near_;                    ///< triangles that may come near the block
   std::uint64_t near_size_ = 0, staged_ = 0;  ///< the number of near triangles, and of those staged
 };
 

@@ -8,7 +8,7 @@
 #include "cuda/query/lens_sums.h"
 #include "cuda/query/solid_ref.h"
 
-// A batch's pairs of a tree and a field, as batch_arrays.h has those of trees. Sums are in double.
+// A batch's pairs of a tree and a field; batch_arrays.h has those of trees. Sums are in double.
 // Whichever is A, the field comes first here: the tree is placed in the field's frame.
 
 namespace ist::gpu {
@@ -26,12 +26,11 @@ struct FieldCounters {
   std::uint32_t listed[kFieldGroups];  ///< by FieldGroup
   std::uint32_t taken[kFieldGroups];   ///< of smooth fields, and of pairs outside rounds
   std::uint32_t large;                 ///< pairs that did not fit in their round
-  TriangleRound round[2];              ///< the one in work, and the one before
+  TriangleRound round[2];              ///< the current one, and the one before
 };
 
 constexpr std::uint32_t kNoPart = ~0u;
 
-/// A pair of a round.
 struct TriangleQuery {
   PairPlace place;
   LensTotals walked;  ///< sums of balls that no triangle intersects
@@ -40,7 +39,7 @@ struct TriangleQuery {
   bool fits;                 ///< its parts fit
 };
 
-/// Balls of a pair that triangles intersect, as a traversal has left them: a MetView in words.
+/// Balls of a pair that triangles intersect, as left by a traversal: a MetView in words.
 struct MetPart {
   std::uint32_t query;  ///< in the round
   std::uint32_t next;   ///< the next part of the same pair, or kNoPart
@@ -49,7 +48,6 @@ struct MetPart {
   LensTotals totals;
 };
 
-/// The memory of a round.
 struct TriangleWorkspace {
   TriangleQuery* queries;
   MetPart* parts;
@@ -69,7 +67,6 @@ IST_HD inline std::uint32_t& listed_pair(const FieldBatch& batch, int group, std
   return batch.list[group == kSmooth ? 0 : 1][k];
 }
 
-/// The sides of pair i.
 struct FieldSides {
   GpuPlacedSolids field, tree;
   bool turned;  ///< the field is B

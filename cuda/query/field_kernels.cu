@@ -8,14 +8,13 @@ namespace ist::gpu {
 namespace {
 
 constexpr unsigned kThreadsEach = 128;  ///< of kernels with one thread per pair
-constexpr unsigned kWarps = 4;          ///< whose memory is what a block may have
+constexpr unsigned kWarps = 4;          ///< limited by a block's memory
 constexpr unsigned kThreads = 32 * kWarps;
-constexpr int kBlocksEach = 4;  ///< on a multiprocessor: what registers allow, 128 a thread
+constexpr int kBlocksEach = 4;  ///< on a multiprocessor, limited by registers, 128 a thread
 constexpr unsigned kWholeWarps = 3;
 constexpr unsigned kWholeThreads = 32 * kWholeWarps;
 constexpr int kWholeBlocksEach = 4;  ///< 168 a thread
 
-/// Begins round n.
 __global__ void __launch_bounds__(kThreadsEach)
     place_queries(const FieldBatch batch, const std::uint32_t n) {
   const std::uint32_t first = end_of(batch, round_of(batch, n + 1));
@@ -53,7 +52,7 @@ __global__ void __launch_bounds__(kThreadsEach)
   if (k < walked_of(batch, round_of(batch, n))) answer_query(batch, k);
 }
 
-/// Pairs that did not fit in their round, and those after the last of `n` rounds.
+/// Sums pairs that did not fit in their round, and those after the last of `n` rounds.
 __global__ void __launch_bounds__(kWholeThreads, kWholeBlocksEach)
     sum_the_rest(const FieldBatch batch, const std::uint32_t n) {
   __shared__ FacetWholeMemory memory[kWholeWarps];
@@ -69,9 +68,9 @@ __global__ void __launch_bounds__(kWholeThreads, kWholeBlocksEach)
 }
 
 constexpr unsigned kSiftThreads = 256;
-constexpr unsigned kSmoothWarps = 3;  ///< whose memory is what a block may have
+constexpr unsigned kSmoothWarps = 3;  ///< limited by a block's memory
 constexpr unsigned kSmoothThreads = 32 * kSmoothWarps;
-constexpr int kSmoothBlocksEach = 6;  ///< on a multiprocessor: what registers allow
+constexpr int kSmoothBlocksEach = 6;  ///< on a multiprocessor, limited by registers
 
 /// Places every pair and lists those that need a sum.
 __global__ void __launch_bounds__(kSiftThreads) sift_field_pairs(const FieldBatch batch) {

@@ -6,8 +6,8 @@
 #include "base/team.h"
 #include "cuda/query/field_batch.h"
 
-// The steps of a batch's pairs of a tree and a field, as batch_steps.h has those of trees. Fields
-// with triangles are in triangle_steps.h.
+// The steps of a batch's pairs of a tree and a field; batch_steps.h has those of trees. Fields with
+// triangles are in triangle_steps.h.
 
 namespace ist::gpu {
 

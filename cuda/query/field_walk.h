@@ -36,7 +36,6 @@ IST_HD inline double distance_in(const FieldRef& field, const double (&x)[3], bo
   }
 }
 
-/// The error of distances.
 IST_HD inline double distance_error(const FieldRef& field) {
   return field.kind == FieldKind::grid ? field.grid.error : 0;
 }
@@ -59,7 +58,6 @@ IST_HD inline BallPart part_in(const FieldRef& field, const double (&x)[3], doub
   }
 }
 
-/// A placed field and a placed tree in a team's memory.
 struct ProbeMemory {
   PairPlace place;
   double whole[4];  ///< ball around the tree, the field's frame

@@ -10,13 +10,13 @@
 #include "query/base/precision.h"
 
 // One team searches two trees for two minima at once, the gap of the inner spheres and that of
-// their cover balls: depth first, the nearest child first, as GapDescent of query/separation.cpp.
+// their cover balls: depth first, the nearest child first, like GapDescent of query/separation.cpp.
 // Two pairs of one kind are visited at a time: item k of 32 is child, or sphere, k % 16 of pair k /
 // 16.
 //
 // Gaps in the arithmetic of a block (Real) are lowered by their rounding, and those that may still
-// be least are computed in double. So both minima are those of all pairs of spheres in double,
-// whatever the order of visits.
+// be least are computed in double. So both minima are those of all pairs of spheres in double, in
+// any order of visits.
 
 namespace ist::gpu {
 
@@ -25,18 +25,18 @@ struct GapTotals {
   static constexpr double kNone = 1.7976931348623157e308;
 
   double gap;                 ///< least of the spheres
-  double cover;               ///< least of the cover balls; of what was not opened: a lower bound
+  double cover;               ///< the least of the cover balls; of unopened pairs a lower bound
   std::uint32_t a, b;         ///< spheres of the least gap
   std::uint32_t visits;       ///< node pairs opened
   std::uint32_t spheres;      ///< sphere pairs measured
-  std::uint32_t out_of_time;  ///< 1: visits ended before all was known
+  std::uint32_t out_of_time;  ///< 1: a limit of visits stopped the search
 
   IST_HD void clear() {
     gap = cover = kNone;
     a = b = ~0u;
     visits = spheres = out_of_time = 0;
   }
-  /// Takes a gap if it is less. Of equal gaps the spheres of lower number are kept.
+  /// Takes a gap if it is less. Among equal gaps the spheres of lower number are kept.
   IST_HD void meet(double new_gap, std::uint32_t new_a, std::uint32_t new_b, double new_cover) {
     if (new_gap < gap || (new_gap == gap && (new_a < a || (new_a == a && new_b < b)))) {
       gap = new_gap;
@@ -107,7 +107,7 @@ class GapDescent {
     if (team_.lane() == 0)
       for (int i = 0; i < 9; ++i) m_.turn[i] = static_cast<Real>(m_.place.a_from_b.m[i]);
     const double length = span(m_.root(0), m_.root(1), m_.place.a_from_b);
-    // A third more, since limits and gaps are rounded too.
+    // Limits and gaps are rounded too: a third more.
     double margin = ist::distance_error<Real>(length) * (4.0 / 3);
     if (sizeof(Real) == 8) {
       // If the distance exceeds double precision, everything would be a candidate; GapTotals::cover
@@ -139,7 +139,7 @@ class GapDescent {
     team_.sync();
   }
 
-  /// Continues as if `before` were all that is known. finish() then returns what is new.
+  /// Continues as if only `before` were known. finish() then returns the difference.
   IST_HD void restart(const GapTotals& before) {
     if (team_.lane() == 0) m_.best.clear();
     limit_gap_ = limit_of(before.gap);
@@ -299,8 +299,7 @@ class GapDescent {
     team_.sync();
   }
 
-  /// Looks at child `lane` of the opened node of a pair. Its position is 0 if it may be near
-  /// enough.
+  /// Tests child `lane` of the opened node of a pair. Its position is 0 if it may be near enough.
   IST_HD void look_below(std::uint32_t word_a, std::uint32_t word_b, std::uint32_t lane,
                          Child& child) const {
     const bool of_a = (word_a >> kGapNodeBits & 1) != 0;
@@ -369,7 +368,7 @@ class GapDescent {
     const int tests = of_first[0] * of_first[1];
     const int rows = near[1] - of_first[1];  // spheres of B in the second pair
     const int all = tests + (near[0] - of_first[0]) * rows;
-    GapTotals mine;  // this lane's; limits are its own until all have met
+    GapTotals mine;  // this lane's; limits are local until all have met
     mine.clear();
     bool found = false;
     for (int k = team_.lane(); k < all; k += Team::kWidth) {
@@ -477,7 +476,7 @@ class GapDescent {
   GapMemory<Real>& m_;
   Real margin_;
   int size_ = 0;
-  Real limit_gap_ = kHuge, limit_cover_ = kHuge;  ///< the team's but inside of meet()
+  Real limit_gap_ = kHuge, limit_cover_ = kHuge;  ///< the team's, except inside of meet()
   std::uint32_t visits_ = 0, spheres_ = 0;        ///< the team's
 };
 

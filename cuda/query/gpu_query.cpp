@@ -35,7 +35,6 @@ namespace {
 
 /// Capacities for split pairs. A batch that needs more is answered too, more slowly.
 constexpr std::uint32_t kSplitCapacity = 1 << 16, kTaskCapacity = 1 << 19, kEntryCapacity = 1 << 21;
-/// Capacities of a round of pairs with triangles.
 constexpr std::uint32_t kQueryCapacity = 1 << 16, kPartCapacity = 1 << 17, kWordCapacity = 3 << 22;
 /// Capacities of a round of pairs of meshes, and their chunks of triangles.
 constexpr std::uint32_t kMeshCapacity = 1 << 15, kChunksEach = 64, kMostChunks = 1 << 19;

@@ -66,7 +66,7 @@ void launch_separations(const SeparationArrays& batch, const Grids& grids, bool 
 /// `memory_bytes` limits the number of teams that divide contacts.
 void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t memory_bytes,
                     cudaStream_t stream);
-/// `has`: the groups of which there are fields.
+/// `has`: true for groups that have fields.
 void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups],
                         const Grids& grids, cudaStream_t stream);
 

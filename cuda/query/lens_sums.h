@@ -11,8 +11,8 @@
 
 namespace ist::gpu {
 
-// Sums over the spheres below each node of a tree, so that a node inside a field as a whole takes
-// one step.
+// Sums over the spheres below each node of a tree, so that a node that is wholly inside a field
+// takes one step.
 
 /// The sums over the spheres below a node, their tree's unit frame.
 struct NodeSum {
@@ -54,18 +54,17 @@ enum Term {
   kTerms = 10
 };
 
-/// A ball of a lens.
 struct LensBall {
   double at[3], r;
 };
 
 /// Adds the lens of ball A at `lever` and ball B at `apart` from it, lengths times `unit`; false if
-/// they do not intersect. Centres within `blur`, their rounding, are taken as equal, so that equal
+/// they do not intersect. Centres within `blur`, their rounding, count as equal, so that equal
 /// balls do not push, as on the CPU.
 ///
 /// Terms that cancel are computed in double as products of sums: the depth of the overlap, and how
 /// far the smaller ball extends beyond the larger. The rest, lens() of query/kernel/lens.h, then
-/// keeps its digits in float, also where balls graze.
+/// keeps its digits in float, even if balls graze.
 IST_HD inline bool add_lens(const LensBall& lever, const LensBall& apart, double unit, double blur,
                             float (&sum)[kTerms]) {
   const double d2 = std::fma(apart.at[0], apart.at[0],
@@ -126,7 +125,6 @@ IST_HD constexpr int power_of(int term) {
   return term < kForce ? 3 : term < kTorque ? 2 : term < kMoment ? 3 : 4;
 }
 
-/// A factor to the power of a term.
 IST_HD inline double term_factor(double factor, int term) {
   double out = factor * factor;
   for (int p = power_of(term); p > 2; --p) out *= factor;

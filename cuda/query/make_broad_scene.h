@@ -63,13 +63,13 @@ inline BroadScene make_broad_scene(std::span<const SolidBox> boxes,
   BroadArrays& arrays = scene.arrays;
   arrays.count = static_cast<std::uint32_t>(bodies.size());
   arrays.max_pairs = static_cast<std::uint32_t>(settings.max_pairs);
-  // A cell is about as large as a body: smaller ones order bodies no better.
+  // A cell is about as large as a body: smaller cells would not improve the order.
   arrays.cells = sized == 0 ? 1 : std::exp2(-std::round(sizes / static_cast<double>(sized)));
   const auto bits_of_count = [](std::size_t count) {
     return static_cast<int>(std::bit_width(count));
   };
   const int world_bits = bits_of_count(of_world.size() - 1);
-  // Few bodies need no fine order, and each 8 bits of a key are a pass of the sort.
+  // Few bodies need no fine order, and each 8 bits of a key cost a pass of the sort.
   const int most = bits_of_count(*std::max_element(of_world.begin(), of_world.end()));
   arrays.axis_bits = std::min({20, (64 - world_bits) / 3, 4 + most});
   arrays.key_bits = 3 * arrays.axis_bits + world_bits;
@@ -85,7 +85,7 @@ inline BroadScene make_broad_scene(std::span<const SolidBox> boxes,
   return scene;
 }
 
-/// The answer that its steps write.
+/// The answer that the scene's steps write.
 inline GpuScenePairs pairs_of(const BroadArrays& scene) {
   return {scene.met + 1,
           scene.met,

@@ -38,7 +38,7 @@ constexpr int kMeshGapItems = kMeshGapPairs * static_cast<int>(kWidth);
 constexpr int kMeshGapStack = kMeshGapItems * (2 * (kMaxLevels - 1) + 1);
 constexpr std::uint32_t kMeshGapQueue = 96;  ///< pairs of triangles to be measured
 
-constexpr std::uint32_t kMeshGapLeft = 32;  ///< the most that a search leaves in the queue
+constexpr std::uint32_t kMeshGapLeft = 32;  ///< pairs that a search may leave in the queue
 
 /// The memory of a team that measures pairs of triangles.
 struct MeshGapPair {
@@ -46,7 +46,7 @@ struct MeshGapPair {
   MeshTree mesh[2];
   double reach;
   NearestTriangles best;
-  exact::Point level;  ///< along which level faces are apart
+  exact::Point level;  ///< the normal of parallel faces
   std::uint32_t crosses;
   std::uint32_t queue[kMeshGapQueue][2];  ///< pairs of triangles, 16 · block + lane
   float apart[kMeshGapQueue];             ///< a lower bound of their distance from floats
@@ -69,19 +69,19 @@ struct MeshGapMemory : MeshGapPair {
   const FloatBlock* in_floats[2];
   Quad row[3];  ///< of the map to A's frame, the translation last
   BoxLook<Real, Real> look[2];
-  float way[3][3];         ///< the axes of A's look
+  float axis[3][3];        ///< the axes along which A's extents are compared
   double limit;            ///< pairs farther apart than this do not matter
-  Real squared_limit;      ///< with what rounds
+  Real squared_limit;      ///< including rounding
   Real limit_of_boxes[2];  ///< the same in the frames of A and B
   /// Pending pairs of nodes (MeshNode). A's has a further bit that is set if it is opened next.
   std::uint32_t stack_a[kMeshGapStack], stack_b[kMeshGapStack];
-  Real stack_squared[kMeshGapStack];  ///< no nearer than that
+  Real stack_squared[kMeshGapStack];  ///< squared lower bounds
   Real key[kMeshGapItems];
-  ExactTriangle triangles[2][kWidth];  ///< their boxes along the axes of A's look
+  ExactTriangle triangles[2][kWidth];  ///< their boxes along the axes of comparison
   float vertices[3][2][kWidth];        ///< of two blocks, A's frame
   std::uint8_t near[2][kWidth];        ///< triangles that may be near enough
   std::uint8_t met[kWidth * kWidth];   ///< pairs of them, 16 · A's + B's
-  WayAxes axes[2];                     ///< for A's nodes, and for B's
+  GapAxes axes[2];                     ///< for A's nodes, and for B's
 
   // The error of a float coordinate in A's frame, relative to the reach.
   static constexpr float kPlacing = 1e-6f;
@@ -95,7 +95,7 @@ struct MeshGapMemory : MeshGapPair {
   }
 
   IST_HD float along(int k, const float (&x)[3]) const {
-    return std::fma(way[k][0], x[0], std::fma(way[k][1], x[1], way[k][2] * x[2]));
+    return std::fma(axis[k][0], x[0], std::fma(axis[k][1], x[1], axis[k][2] * x[2]));
   }
   IST_HD static float squared_gap(float low, float high, float other_low, float other_high) {
     const float gap = std::fmax(0.0f, std::fmax(low - other_high, other_low - high));
@@ -103,7 +103,7 @@ struct MeshGapMemory : MeshGapPair {
   }
 
   /// Computes a triangle's plane. Returns the height above it, times the normal's length, beyond
-  /// which all is too far.
+  /// which everything is too far.
   IST_HD float place_plane(const float (&t)[3][3], float far, float size, Quad& n) const {
     float u[3], v[3], longest = 0;
     for (int k = 0; k < 3; ++k) {
@@ -167,19 +167,19 @@ IST_HD void limit_to(MeshGapMemory<Real>& m, double distance) {
 
 /// Sets the direction from A to B along which extents are compared from now on, unless it is zero.
 template <class Real, class Team>
-IST_HD_COLD void look_along(const Team& team, MeshGapMemory<Real>& memory, exact::Point way) {
+IST_HD_COLD void look_along(const Team& team, MeshGapMemory<Real>& memory, exact::Point direction) {
   MeshGapMemory<Real>& m = *team.memory(&memory);
-  const bool known = dot(way, way) > 0;
+  const bool known = dot(direction, direction) > 0;
   if (team.lane() == 0) {
-    m.axes[0] = known ? axes_along(way) : WayAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    m.axes[0] = known ? axes_along(direction) : GapAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     m.axes[1] = seen_back(m.axes[0], m.map[1], m.map[0].scale);
   }
   team.sync();
   for (int k = team.lane(); k < 18; k += Team::kWidth) {
     const int side = k / 9, j = k % 9 / 3, axis = k % 3;
-    const double along = (&m.axes[side].way[j].x)[axis];
-    if (side == 0) m.way[j][axis] = static_cast<float>(along);
-    if (known) m.look[side].turn(m.axes[side].way[j], along, j, axis);
+    const double along = (&m.axes[side].axis[j].x)[axis];
+    if (side == 0) m.axis[j][axis] = static_cast<float>(along);
+    if (known) m.look[side].turn(m.axes[side].axis[j], along, j, axis);
   }
   team.sync();
 }
@@ -231,18 +231,18 @@ IST_HD bool measure_triangles(const Team& team, MeshGapPair& memory, std::uint32
   if (wants && name == lowest) {
     m.best.set(squared, name, found.on_a, found.between);
     if (const double distance = std::sqrt(squared); distance > 0) {
-      const exact::Point way = (1 / distance) * found.between;
-      exact::Point level = way;
-      level_with(a.corner, way, level);
-      level_with(b.corner, way, level);
+      const exact::Point direction = (1 / distance) * found.between;
+      exact::Point level = direction;
+      level_with(a.corner, direction, level);
+      level_with(b.corner, direction, level);
       m.level = level;
     }
   }
   team.sync();
   return next.least < before && !any_crosses;
 }
-/// Measures the last pairs of a queue and returns the number left. Rare code is in functions of its
-/// own, since the search needs its registers and the device its instruction cache.
+/// Measures the last pairs of a queue and returns the number left. Rare code is in separate
+/// functions, since the search needs its registers and the device its instruction cache.
 template <class Real, class Team>
 IST_HD_COLD std::uint32_t measure_last(const Team& team, MeshGapMemory<Real>& memory,
                                        std::uint32_t queued) {
@@ -295,8 +295,8 @@ IST_HD_COLD std::uint32_t cull(const Team& team, MeshGapPair& memory, std::uint3
 }
 
 /// True if no triangles of two blocks are nearer than the best pair, up to rounding, and they come
-/// after it. So are most pairs of parallel faces, which floats cannot distinguish from nearer ones.
-/// `squared`: the blocks are no nearer.
+/// after it. This excludes most pairs of parallel faces, which floats cannot distinguish from
+/// nearer ones. `squared`: a lower bound for the blocks.
 template <class Team>
 IST_HD_COLD bool cannot_answer(const Team& team, const MeshGapPair& m, std::uint32_t a,
                                std::uint32_t b, double squared) {

@@ -6,10 +6,11 @@
 
 #include "cuda/query/mesh_gap_memory.h"
 
-// The distance of two meshes by one team, as MeshGapSearch of query/exact/mesh_distance.cpp: depth
-// first, the nearest child first. Two pairs of nodes are opened together: item k of 32 is child k %
-// 16 of pair k / 16. Triangles of two blocks that may be near enough are measured in float, which
-// bounds the distance from above. Pairs that may be the nearest are queued and measured in double.
+// The distance of two meshes by one team, like MeshGapSearch of query/exact/mesh_distance.cpp:
+// depth first, the nearest child first. Two pairs of nodes are opened together: item k of 32 is
+// child k % 16 of pair k / 16. Triangles of two blocks that may be near enough are measured in
+// float, which bounds the distance from above. Pairs that may be the nearest are queued and
+// measured in double.
 
 namespace ist::gpu {
 
@@ -73,7 +74,7 @@ class MeshGapSearch {
   IST_HD bool stopped() const { return stopped_; }
   IST_HD std::uint32_t visits() const { return visits_; }
   IST_HD std::uint32_t tests() const { return tests_; }
-  /// The squared distance than which no pending pair is nearer.
+  /// The squared distance below which no pending pair can be.
   IST_HD double left() const {
     Real least = kHuge;
     for (int k = team_.lane(); k < size_; k += Team::kWidth)
@@ -159,7 +160,7 @@ class MeshGapSearch {
         float_of(bits_of(static_cast<float>(x < 1e37 ? (x > 0 ? x : 0) : 1e37)) & 0xfffff000u));
   }
 
-  /// Looks at child `lane` of the opened node of a pending pair. True if it may be near enough.
+  /// Tests child `lane` of the opened node of a pending pair. True if it may be near enough.
   IST_HD bool look_below(int pair, std::uint32_t lane, Child& child) const {
     const bool of_a = (m_.stack_a[pair] & kOpensA) != 0;
     const MeshNode a = node_a(pair), b = node_b(pair);
@@ -232,12 +233,13 @@ class MeshGapSearch {
   /// True if triangles may be within the limit, by their extents along the axes.
   IST_HD bool may_be_near(std::uint32_t of_a, std::uint32_t of_b) const {
     double squared = 0;
-    for (const exact::Point& way : m_.axes[0].way) {
+    for (const exact::Point& axis : m_.axes[0].axis) {
       double low[2], high[2];
       for (int side = 0; side < 2; ++side) {
         const std::uint32_t name = side == 0 ? of_a : of_b;
-        const double p = dot(way, m_.corner(side, name, 0)), q = dot(way, m_.corner(side, name, 1)),
-                     r = dot(way, m_.corner(side, name, 2));
+        const double p = dot(axis, m_.corner(side, name, 0)),
+                     q = dot(axis, m_.corner(side, name, 1)),
+                     r = dot(axis, m_.corner(side, name, 2));
         low[side] = std::fmin(p, std::fmin(q, r));
         high[side] = std::fmax(p, std::fmax(q, r));
       }
@@ -338,7 +340,7 @@ class MeshGapSearch {
   }
 
   /// Computes a triangle's plane, and the height above it, times the normal's length, beyond which
-  /// all is too far.
+  /// everything is too far.
   IST_HD void place_plane(int side, float far, float size, ExactTriangle& out) const {
     const std::uint32_t name = out.name();
     float t[3][3];
@@ -398,7 +400,7 @@ class MeshGapSearch {
     const single::Face face_a(first_a, corner(0, name_a, 1) - first_a,
                               corner(0, name_a, 2) - first_a);
     single::NearestPoints found = {HUGE_VALF, {}, {}};
-    // Loops stay rolled, since unrolled code would fill the instruction cache.
+    // Loops stay rolled: unrolled code would fill the instruction cache.
     IST_ROLLED
     for (int c = 0; c < 3; ++c) {
       const single::Vec3 from = corner(0, name_a, c),
@@ -420,14 +422,14 @@ class MeshGapSearch {
       team_.sync();
       come_to<Real>(team_, m_, distance, between);
     }
-    // Between planes perpendicular to that direction nothing is nearer, however the points were
+    // Nothing is nearer between planes perpendicular to that direction, however the points were
     // found.
-    const single::Vec3 way = found.between;
-    const float length = std::sqrt(dot(way, way)) * (1 + 1e-6f);
+    const single::Vec3 between = found.between;
+    const float length = std::sqrt(dot(between, between)) * (1 + 1e-6f);
     float last = -1e30f, next = 1e30f;
     for (int c = 0; c < 3; ++c) {
-      last = std::fmax(last, dot(way, corner(0, name_a, c)));
-      next = std::fmin(next, dot(way, of_b[c]));
+      last = std::fmax(last, dot(between, corner(0, name_a, c)));
+      next = std::fmin(next, dot(between, of_b[c]));
     }
     const float apart = length > 0 ? (next - last) / length : 0;
     queued_ = append(team_, m_, queued_, k < met && apart <= m_.limit_in_floats(), kWidth * a + i,

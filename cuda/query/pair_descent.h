@@ -8,7 +8,7 @@
 #include "cuda/query/pair_memory.h"
 
 // The sum over two trees by one team. Descent (query/tree_overlap/descent.h) visits level by level;
-// this traversal is depth first, so that its pending pairs fit into a team's own memory.
+// this traversal is depth first, so that its pending pairs fit into a team's memory.
 
 namespace ist::gpu {
 
@@ -22,7 +22,8 @@ class PairSums {
 
   /// The sum to which the lane's next lenses are added.
   IST_HD float (&begin())[kTerms] { return sum_; }
-  /// Ends a round of lenses, whose spheres have these numbers if `flag`. Called by all lanes.
+  /// Ends a round of lenses. Where `flag` is set, their spheres have these numbers. Called by all
+  /// lanes.
   IST_HD void end(bool, std::uint32_t, std::uint32_t) { ++summed_; }
 
   /// A lane adds few numbers in float before they continue in double.
@@ -48,7 +49,7 @@ class PairSums {
   int summed_ = 0;     ///< numbers in it, at most
 };
 
-/// `Sums` receives the lenses, as PairSums does.
+/// `Sums` receives the lenses, like PairSums.
 template <class Team, class Sums = PairSums<Team>>
 class PairDescent {
  public:

@@ -19,7 +19,7 @@ namespace ist::gpu {
 /// The share of the overlap in one bin of the divided tree.
 struct PatchBin {
   double term[kTerms];
-  double pull;    ///< |force|, as term[kForce] has it
+  double pull;    ///< |force|, as in term[kForce]
   double before;  ///< Σ of the pulls of the bins of lower rank
 };
 
@@ -43,8 +43,8 @@ struct PatchParts {
 struct PatchWorkspace {
   PatchParts* parts;
   PatchBin* bin;         ///< [most_bins] by rank
-  std::uint16_t* rank;   ///< [most_bins] of the bins that hold anything, in order
-  std::uint8_t* member;  ///< [most_bins] the part that each of them is in
+  std::uint16_t* rank;   ///< [most_bins] of the bins that are not empty, in order
+  std::uint8_t* member;  ///< [most_bins] the part that contains each of them
 
   IST_HD static constexpr std::size_t bytes(std::uint32_t most_bins) {
     const std::size_t all = sizeof(PatchParts) + most_bins * (sizeof(PatchBin) + 3);
@@ -68,10 +68,10 @@ struct PatchMemory {
   static constexpr std::uint32_t kWords = kMostContactBins / 32;
 
   PairMemory pair;
-  std::uint32_t marked[kWords];           ///< bins that hold anything, by rank
+  std::uint32_t marked[kWords];           ///< bins that are not empty, by rank
   std::uint16_t bins_before[kWords + 1];  ///< marked bins of lower words
   float term[32][kTerms + 1];  ///< the terms of lanes; an odd number avoids bank conflicts
-  int bin[32];                 ///< the bins that they go to
+  int bin[32];                 ///< the bins to which they are added
 };
 
 /// A batch of contact patches, with its working memory.

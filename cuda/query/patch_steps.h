@@ -9,8 +9,8 @@
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/patch_memory.h"
 
-// The steps of a batch of contact patches, as batch_steps.h has penetrations. One team processes a
-// pair from beginning to end.
+// The steps of a batch of contact patches; batch_steps.h has those of penetrations. One team
+// processes a pair from beginning to end.
 
 namespace ist::gpu {
 
@@ -239,7 +239,7 @@ class PatchDivision {
     team_.sync();
   }
 
-  /// The part with the largest loss, of equal ones that with the lowest id; −1 if no part has a
+  /// The part with the largest loss, among equals that with the lowest id; −1 if no part has a
   /// loss.
   IST_HD int next_to_divide(int size) const {
     const PatchPart* const parts = work_.parts->part;
@@ -265,7 +265,7 @@ class PatchDivision {
     const CutNode* const nodes = in_global_memory(cuts_.node);
     const double least = kLeastContactShare * total_, pull = part.pull;
     const int all = static_cast<int>(part.bins);
-    std::uint32_t at = part.node;  // goes down while all that counts lies on one side
+    std::uint32_t at = part.node;  // descends while everything that counts is on one side
     int begin = bins_below(nodes[at].begin), middle = 0;
     for (;;) {
       const std::uint32_t rest = nodes[at].rest;
@@ -394,7 +394,6 @@ class PatchWriter {
   double deepest_;  ///< [u] of any patch
 };
 
-/// Sums pair i and divides it.
 template <class Team>
 IST_HD void patch_pair(const Team& team, const PatchArrays& batch, std::uint32_t i,
                        const PatchWorkspace& work, PatchMemory& memory) {

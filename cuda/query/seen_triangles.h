@@ -7,7 +7,7 @@
 
 namespace ist::gpu {
 
-constexpr int kSeen = 32;  ///< triangles looked at together, a bit each
+constexpr int kSeen = 32;  ///< triangles tested together, a bit each
 
 /// The error of lengths, relative to the reach within which triangles are staged.
 constexpr float kSeenTolerance = 1e-5f;
@@ -45,8 +45,8 @@ struct SeenTriangles {
     for (int k = 0; k < 3; ++k) diagonal[k] = c[2][k] - c[0][k];
     cross(edge[0], diagonal, n);  // as in TrianglePlane
     const double n2 = dot(n, n);
-    // Nothing is certain of a triangle that is too small, or so thin that rounding turns its plane
-    // by more than the tolerance.
+    // Nothing is certain about a triangle that is too small, or so thin that rounding turns its
+    // plane by more than the tolerance.
     constexpr double kTurn = 0x1p-50, kUnseen = kSeenTolerance / 4;
     const bool clear = n2 * (kUnseen * kUnseen) >
                            (kTurn * kTurn) * (length2[0] * dot(diagonal, diagonal)) * far2 &&
@@ -55,7 +55,7 @@ struct SeenTriangles {
     const double per_n = clear ? inverse_root(n2) : 0;
     for (double& x : n) x *= per_n;
     plane[place][0] = plane_through(corner[0], n);
-    if (!(n2 > 0)) plane[place][0].at_centre = kFar;  // it is flat: nothing meets it
+    if (!(n2 > 0)) plane[place][0].at_centre = kFar;  // it is flat: no ball meets it
     for (int i = 0; i < 3; ++i) {
       double inwards[3];
       cross(n, edge[i], inwards);

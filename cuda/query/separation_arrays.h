@@ -17,8 +17,8 @@ struct MeshGapQuery {
   double error;           ///< of the computed distance, against that of the solids
   double simplified;      ///< the share of that from the meshes' own error
   double reach;           ///< no coordinate is larger
-  double most;            ///< the distance, if it is more, is not asked for
-  double likely;          ///< it is no more than this, unless a solid holds the other
+  double most;            ///< larger distances need not be found
+  double likely;          ///< an upper bound, unless a solid contains the other
   Vec3 toward;            ///< unit, from A to B near where they are nearest; or zero
   std::uint32_t pair;     ///< in the batch
   std::uint32_t swapped;  ///< 1: its A is the query's B
@@ -29,7 +29,7 @@ struct MeshGapQuery {
   std::uint32_t in_double;  ///< in query k: the k-th query of the round with boxes in double
   std::uint32_t waiting;    ///< pairs of triangles that are to be measured
   std::uint32_t triangles[32][2];
-  double left;  ///< squared: what was stopped is no nearer
+  double left;  ///< squared lower bound of the pairs that a stopped search has left
   NearestTriangles best;
 };
 

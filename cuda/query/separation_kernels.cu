@@ -67,7 +67,6 @@ __global__ void __launch_bounds__(kThreads<Real>, kBlocksEach<Real>)
            });
 }
 
-/// Begins round n of meshes.
 __global__ void __launch_bounds__(kPlaceThreads)
     place_meshes(const SeparationArrays batch, const std::uint32_t n) {
   const std::uint32_t first = n * batch.meshes.query_capacity, listed = batch.counters[2].listed;

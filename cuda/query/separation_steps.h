@@ -12,14 +12,13 @@
 #include "query/base/precision.h"
 #include "query/exact/inside_search.h"
 
-// The steps of a batch of separations, as batch_steps.h has penetrations.
+// The steps of a batch of separations; batch_steps.h has those of penetrations.
 
 namespace ist::gpu {
 
 // The steps of distances of a batch's meshes, for the threads and warps of kernels and for tests on
 // the host. Answers are those of SurfaceGap (query/separation.cpp).
 
-/// The placed solid that is A or B in the query.
 IST_HD inline const GpuPlacedSolids& side_of(const SolidPairs& batch, const MeshGapQuery& query,
                                              int side) {
   return (side == 0) == (query.swapped == 0) ? batch.pairs.a : batch.pairs.b;
@@ -38,7 +37,6 @@ IST_HD inline SeparationRow farther_row(double most) {
   return row;
 }
 
-/// The counters of the n-th round.
 IST_HD inline MeshGapRound& round_of(const MeshGapArrays& meshes, std::uint32_t n) {
   return meshes.rounds[n % 2];
 }
@@ -112,8 +110,8 @@ IST_HD void glance_at_spheres(const Team& team, const SeparationArrays& batch, s
   query.likely = (found.gap > 0 ? found.gap : 0) + query.error + off;
   double moved[3];
   map.apply_fused(memory.tree[1].ball(kSphereLevel, found.b).centre, moved);
-  const Vec3 way = vec3(moved) - vec3(memory.tree[0].ball(kSphereLevel, found.a).centre);
-  if (const double far = norm(way); far > 0) query.toward = way / far;
+  const Vec3 toward = vec3(moved) - vec3(memory.tree[0].ball(kSphereLevel, found.a).centre);
+  if (const double far = norm(toward); far > 0) query.toward = toward / far;
 }
 
 /// Loads a pair into a team's memory.
@@ -150,7 +148,7 @@ IST_HD void search_mesh_gap(const Team& team, const SeparationArrays& batch, std
   const std::uint32_t visits = batch.max_visits == ~0u ? ~0u : batch.max_visits - query.visits;
   MeshGapSearch<Team, Real> search(team, memory, query.toward);
   if (batch.max_visits != ~0u) search.begin();
-  // If nothing is as near as is likely, one solid contains the other, or rounding decides.
+  // If nothing is as near as `likely`, one solid contains the other, or rounding decides.
   double limit = std::fmin(most, query.likely + slack);
   IST_ROLLED
   for (;;) {
@@ -195,7 +193,7 @@ IST_HD void measure_mesh_gap(const Team& team, const SeparationArrays& batch, st
   if (team.lane() == 0 && memory.crosses != 0) query.overlap = 1;
 }
 
-/// True if a solid contains a shell of the other, B or A. Called by the whole team.
+/// True if a solid contains a shell of the other. Called by the whole team.
 template <class Team>
 IST_HD bool holds_shell(const Team& team, const SolidPairs& batch, const MeshGapQuery& query,
                         bool b_in_a, InsideStack& stack) {
@@ -233,8 +231,8 @@ IST_HD void finish_mesh_gap(const Team& team, const SeparationArrays& batch, std
     // Spheres have no error of their own.
     row.distance_max = query.overlap == 2 ? 0 : unit * query.simplified;
   } else {
-    // From the pair that answers, since which of several equal pairs is the least depends on the
-    // search.
+    // Starts from the pair that answers, since which of several equal pairs is the least depends on
+    // the search.
     const double nearest = std::fmin(distance - best.rounding, std::sqrt(query.left));
     const double least = (1 - 1e-12) * nearest - slack;
     row.distance = unit * distance;
@@ -243,8 +241,8 @@ IST_HD void finish_mesh_gap(const Team& team, const SeparationArrays& batch, std
     const Vec3 at_a = best.on_a, at_b = best.on_a + best.between;
     row.point_a = place.to_world(query.swapped == 0 ? at_a : at_b);
     row.point_b = place.to_world(query.swapped == 0 ? at_b : at_a);
-    const double way = query.swapped == 0 ? norm(best.between) : -norm(best.between);
-    row.normal = turned(place.rotation_a, best.between / way);
+    const double length = query.swapped == 0 ? norm(best.between) : -norm(best.between);
+    row.normal = turned(place.rotation_a, best.between / length);
   }
   if (query.stopped != 0) row.status = QueryStatus::budget_exhausted;
   row.node_visits = query.visits;
@@ -271,7 +269,7 @@ IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
     const double rounding =
         ist::distance_error<double>(span(memory.root(0), memory.root(1), place.a_from_b));
     const double error = rounding + place.rounding_of_world();
-    // Cover gaps do not include yet what is too far apart for double (GapDescent).
+    // Cover gaps do not yet include pairs that are too far apart for double (GapDescent).
     const double least = totals.cover - rounding - error;
     row.distance = unit * totals.gap;
     row.distance_min = unit * (least > 0 ? least : 0);
@@ -281,8 +279,8 @@ IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
     const NodeBall b = memory.tree[1].ball(kSphereLevel, totals.b);
     double moved[3];
     place.a_from_b.apply_fused(b.centre, moved);
-    const Vec3 at_a = vec3(a.centre), at_b = vec3(moved), way = at_b - at_a;
-    const Vec3 axis = way / norm(way);
+    const Vec3 at_a = vec3(a.centre), at_b = vec3(moved), between = at_b - at_a;
+    const Vec3 axis = between / norm(between);
     row.point_a = place.to_world(at_a + a.r * axis);
     row.point_b = place.to_world(at_b - place.a_from_b.scale * b.r * axis);
     row.normal = turned(place.rotation_a, axis);
@@ -318,7 +316,6 @@ IST_HD inline int sift_separation(const SeparationArrays& batch, std::uint32_t i
   return precision == Precision::float32 ? 0 : 1;
 }
 
-/// Loads pair i into memory.
 template <class Team, class Real>
 IST_HD void load_separation(const Team& team, const SeparationArrays& batch, std::uint32_t i,
                             GapMemory<Real>& memory) {

@@ -84,13 +84,12 @@ struct CutsRef {
   int shift;  ///< a sphere's number >> shift is its bin
 };
 
-/// A matched tree at a level of detail.
 struct DetailRef {
   TreeRef tree;
   LevelCost level;
 };
 
-/// A ball evenly filled with the spheres of a node, as a quick look sees it
+/// A ball evenly filled with the spheres of a node, for coarse estimates
 /// (query/kernel/look_kernel.cpp).
 struct FilledBall {
   double x[3], r;

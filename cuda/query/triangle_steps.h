@@ -14,8 +14,8 @@
 
 // Trees against the triangles of boxes and terrains. A round takes pairs through steps that each
 // fit the instruction cache: place them, find the balls that triangles intersect, sum these, write
-// answers. A round ends when its memory is used up. Pairs that are too large for a round, or that
-// come after the last one, go through all steps by one team, with the same bits.
+// answers. A round ends when its memory is full. Pairs that are too large for a round, or that come
+// after the last one, go through all steps by one team, with the same bits.
 
 namespace ist::gpu {
 
@@ -27,7 +27,6 @@ struct FacetWholeMemory : FacetWalkMemory {
   DiscMemory<FacetId> discs;
 };
 
-/// The counters of the n-th round.
 IST_HD inline TriangleRound& round_of(const FieldBatch& batch, std::uint32_t n) {
   return batch.counters->round[n % 2];
 }
@@ -57,8 +56,8 @@ IST_HD inline void place_query(const FieldBatch& batch, std::uint32_t k, std::ui
   query.first_part = kNoPart;
 }
 
-/// Estimates if a round has memory for one more pair. `teams`: the number of teams that traverse
-/// trees; each may still need as many words as earlier pairs took.
+/// Estimates whether a round has memory for one more pair. `teams`: the number of teams that
+/// traverse trees; each may still need as many words as earlier pairs took.
 IST_HD inline bool goes_on(const FieldBatch& batch, const TriangleRound& round,
                            std::uint32_t teams) {
   constexpr std::uint32_t kLeastEach = 512;
@@ -105,7 +104,6 @@ IST_HD std::uint32_t keep_part(const Team& team, const TriangleWorkspace& work,
   return part;
 }
 
-/// A view of a stored part.
 template <class Id>
 IST_HD MetView<Id> met_of(const TriangleWorkspace& work, const MetPart& part) {
   const MetBall* const balls = work.words + part.first_word;
@@ -114,7 +112,6 @@ IST_HD MetView<Id> met_of(const TriangleWorkspace& work, const MetPart& part) {
           static_cast<int>(part.balls), static_cast<int>(part.pairs)};
 }
 
-/// Loads a query into memory.
 template <class Team>
 IST_HD void load_query(const Team& team, const FieldBatch& batch, const TriangleQuery& query,
                        ProbeMemory& memory) {
@@ -178,7 +175,6 @@ IST_HD inline void answer_query(const FieldBatch& batch, std::uint32_t k) {
   write_field_answer(batch, query.pair, query.place, sum);
 }
 
-/// Runs all steps of pair i.
 template <class Team>
 IST_HD void sum_whole_query(const Team& team, const FieldBatch& batch, std::uint32_t i,
                             FacetWholeMemory& memory) {

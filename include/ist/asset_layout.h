@@ -179,7 +179,7 @@ static_assert(sizeof(MeshShell) == 4);
 /// The solid's boundary: closed, oriented, with winding numbers of 0 and 1 only,
 /// except for touching faces.
 struct MeshHeader {
-  /// Unit frame: the mesh and the solid's boundary lie within it of each other. 0: but for a mesh
+  /// Unit frame: bound on the distance of the mesh from the solid's boundary. 0 except for a mesh
   /// that was made from a signed distance (kFlagPolygonised).
   double error = 0;
   /// Unit frame: bound on the displacement of a vertex by rounding.

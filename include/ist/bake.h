@@ -166,12 +166,12 @@ struct PartnerError {
 struct TargetedAsset {
   Asset asset;
   double measured_error = 0;  ///< relative, median near the requested overlap, of the worst partner
-  std::uint32_t poses = 0;    ///< of all partners; 0: none was tried, for lack of time or room
+  std::uint32_t poses = 0;    ///< of all partners; 0: none was found, or time ran out
   std::array<PartnerError, kTrialPartners> partners = {};  ///< error of each
   bool met = false;  ///< poses > 0 and measured_error ≤ the requested one
-  /// What ended the search. sphere_count: the target is met with few spheres, or not met with the
-  /// largest allowed count. time_limit: the best asset until then, met or not. Else the limit that
-  /// stopped the packing.
+  /// The reason for the end of the search. sphere_count: the target is met with few spheres, or not
+  /// met with the largest allowed count. time_limit: the best asset until then, met or not. Else
+  /// the limit that stopped the packing.
   StopReason stop = StopReason::sphere_count;
 };
 

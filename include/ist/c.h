@@ -274,7 +274,7 @@ typedef struct ist_shape_sample {
   double gradient[3]; /* of the distance: outward */
 } ist_shape_sample_t;
 
-/* A plain view: what it points to must outlive its use. */
+/* A plain view: its memory must outlive its use. */
 typedef struct ist_shape {
   uint32_t size;
   ist_shape_kind_t kind;
@@ -453,10 +453,10 @@ typedef struct ist_contact_patches_t {
 /* OutlineSegment: a piece of the curve on which two surfaces cross. */
 typedef struct ist_outline_segment {
   double from[3], to[3]; /* [u] world */
-  uint32_t patch;        /* number of the patch that it bounds; 0 without room for patches */
+  uint32_t patch;        /* number of the patch that it bounds; 0 without memory for patches */
 } ist_outline_segment_t;
 
-/* Room for an outline. */
+/* Memory for an outline. */
 typedef struct ist_outline {
   uint32_t size;
   uint32_t segment_size;           /* sizeof(ist_outline_segment_t) */
@@ -606,7 +606,7 @@ typedef struct ist_ray {
   double max_distance; /* [u] its length; 0: infinite */
 } ist_ray_t;
 
-/* RayHit: where a ray meets the surface first, on its way out if it starts inside. */
+/* RayHit: where a ray first meets the surface, from inside if it starts there. */
 typedef struct ist_ray_hit {
   ist_status_t status;
   uint32_t triangle; /* of the kept mesh; UINT32_MAX: no hit, or a shape */

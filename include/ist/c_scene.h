@@ -27,7 +27,7 @@ typedef struct ist_scene_settings {
   size_t max_bodies;         /* 0: 1,024 */
   size_t max_pairs;          /* pairs of bodies whose boxes meet, in one step; 0: 8,192 */
   size_t workers;            /* as many threads may work at a step; 0: 1 */
-  size_t workspace_capacity; /* of each worker, as ist_workspace_make() has it */
+  size_t workspace_capacity; /* of each worker, see ist_workspace_make() */
 } ist_scene_settings_t;
 
 /* IST_INVALID_INPUT: a number is too large. */
@@ -40,7 +40,7 @@ typedef struct ist_scene_body {
   uint32_t size;
   uint32_t number; /* the caller's, unique in its scene: pairs are in its order */
   const ist_placed_t* solid;
-  uint32_t is_still;          /* not 0: it does not move; two such bodies are not asked */
+  uint32_t is_still;          /* not 0: it does not move; two such bodies are not queried */
   uint32_t group;             /* < 8: selects the rule of a pair */
   uint32_t layers, meets;     /* bits: each must be on a layer that the other meets; 0: layer 1, and
                                  all */
@@ -58,7 +58,7 @@ ist_status_t ist_scene_set_poses(ist_scene_t* scene, const uint32_t* numbers,
 ist_status_t ist_scene_set_motions(ist_scene_t* scene, const uint32_t* numbers,
                                    const ist_motion_t* motions, size_t count);
 
-/* What is asked of two bodies. */
+/* The query of two bodies. */
 typedef int32_t ist_scene_answer_t;
 enum {
   IST_SCENE_PENETRATION = 0, /* and ist_separation() where a margin is set */
@@ -75,10 +75,10 @@ typedef struct ist_scene_rule {
   ist_scene_answer_t answer;
   const ist_penetration_settings_t* penetration; /* without pair_id; null: defaults */
   const ist_impact_settings_t* impact;           /* null: defaults */
-  double margin; /* [u] ≥ 0: bodies that come as near are told too */
+  double margin; /* [u] ≥ 0: bodies within this distance are reported too */
 } ist_scene_rule_t;
 
-/* The rule for bodies of two groups, whichever is which. All pairs are asked again. */
+/* The rule for bodies of two groups, whichever is which. All pairs are queried again. */
 ist_status_t ist_scene_set_rule(ist_scene_t* scene, uint32_t group_a, uint32_t group_b,
                                 const ist_scene_rule_t* rule);
 /* joined, not 0: as long as both are there they do not meet. */
@@ -113,12 +113,12 @@ typedef struct ist_scene_step {
   size_t boxes_met; /* pairs of bodies whose boxes meet */
 } ist_scene_step_t;
 
-/* Asks all pairs that may have changed. `parallel`: null is the calling thread.
- * IST_BUDGET_EXHAUSTED: not all pairs had room (max_pairs); nothing was asked and no pair ended. */
+/* Queries all pairs that may have changed. `parallel`: null is the calling thread.
+ * IST_BUDGET_EXHAUSTED: there were too many pairs (max_pairs); none was queried, no pair ended. */
 ist_status_t ist_scene_take_step(ist_scene_t* scene, const ist_parallel_t* parallel,
                                  ist_scene_step_t* step);
 
-/* Answers to a pair of the last step: all zero where its rule asks no such thing. Each returns the
+/* Answers to a pair of the last step: all zero if its rule requests none. Each returns the
  * status of the answer. */
 ist_status_t ist_scene_get_penetration(const ist_scene_t* scene, const ist_scene_pair_t* pair,
                                        ist_penetration_t* answer);
@@ -126,7 +126,7 @@ ist_status_t ist_scene_get_separation(const ist_scene_t* scene, const ist_scene_
                                       ist_separation_t* answer);
 ist_status_t ist_scene_get_impact(const ist_scene_t* scene, const ist_scene_pair_t* pair,
                                   ist_impact_t* answer);
-/* As many as there is room for. */
+/* As many as fit. */
 ist_status_t ist_scene_get_patches(const ist_scene_t* scene, const ist_scene_pair_t* pair,
                                    ist_contact_patches_t* patches);
 

@@ -96,7 +96,7 @@ struct GpuPenetrations {
   std::uint32_t* sphere_pairs = nullptr;  ///< [count]
   double* volume_min = nullptr;  ///< [count] [u³] of the true volume; by spheres: the volume
   double* volume_max = nullptr;  ///< [count] [u³] likewise
-  // Where solids touch, Measure::exact; else 0.
+  // For touching solids by Measure::exact; else 0.
   double* contact_area = nullptr;    ///< [count] [u²] as Penetration::contact_area
   double* contact_normal = nullptr;  ///< [count][3] unit, from A to B, world
   bool* touching = nullptr;          ///< [count]

@@ -98,12 +98,12 @@ struct GpuPenetrationSettings {
   /// The answer comes from the finest levels of detail that are expected to need no more, blended
   /// smoothly with the next coarser ones; see PenetrationSettings::pair_budget.
   std::uint32_t pair_budget = 0;
-  /// Exact measure only. What is kept of pair i of the last batch serves pair i of this one while
-  /// the solids are the same and have moved little against each other since they were searched: by
-  /// up to six steps and 0.3 of a triangle's side. Else they are searched, and what is near is kept
-  /// anew if it has room and steps are short. Solids and poses may change at will: answers have the
-  /// bits that they have without it, but for node_visits, which is 0 where nothing was searched.
-  /// Null: nothing is kept.
+  /// Exact measure only. Keeps the near triangles of pair i of a batch for pair i of the next ones
+  /// while the solids are the same and have moved little relative to each other since they were
+  /// searched: by up to six steps and 0.3 of a triangle's side. Otherwise the pair is searched, and
+  /// its near triangles are kept if they fit and steps are short. Solids and poses may change at
+  /// will: answers have the same bits as without it, except node_visits, which is 0 for a pair that
+  /// was not searched. Null: nothing is kept.
   GpuKept* kept = nullptr;
 };
 
@@ -118,7 +118,7 @@ struct GpuPenetrationSettings {
 /// CPU's, or 1e-15 of the asset's size³ if that is more; gradients likewise. node_visits counts
 /// opened nodes of the asset.
 ///
-/// Measure::exact, of two assets that keep their meshes: the true volume as penetration() has it,
+/// Measure::exact, of two assets with meshes: the true volume as in penetration(),
 /// within 1e-12 of the smaller solid's size³, force and torque likewise, between volume_min and
 /// volume_max, at any pose, flush, coaxial and copied ones too. sphere_pairs counts crossing
 /// triangles. Solids that touch have a volume of 0, `touching`, contact_area and contact_normal, as

@@ -7,7 +7,8 @@
 #include <ist/gpu_query.h>
 #include <ist/scene.h>
 
-// Which of many bodies may overlap, found on a GPU: for penetration_batch() and the other batches.
+// The pairs of many bodies that may overlap, found on a GPU for penetration_batch() and the other
+// batches.
 
 namespace IST_API ist {
 
@@ -23,7 +24,7 @@ struct GpuSceneBody {
 inline constexpr std::uint32_t kGpuWorlds = 1u << 24;
 
 struct GpuSceneSettings {
-  std::size_t max_pairs = 8192;  ///< room for the pairs of one step; < 2^32
+  std::size_t max_pairs = 8192;  ///< capacity for the pairs of one step; < 2^32
   /// [u] ≥ 0: two bodies are a pair too if their boxes are no farther apart.
   double margin = 0;
   /// The measure of the queries that follow. Matched spheres may protrude from their solid, so its
@@ -35,9 +36,9 @@ struct GpuSceneSettings {
 
 /// The pairs that a step found: arrays in device memory that the scene owns.
 struct GpuScenePairs {
-  /// [1] number of pairs. If there are more than max_pairs it is 0, and boxes_met tells.
+  /// [1] number of pairs. If there are more than max_pairs it is 0; see boxes_met.
   const std::uint32_t* count = nullptr;
-  const std::uint32_t* boxes_met = nullptr;  ///< [1] number of pairs, whether there is room or not
+  const std::uint32_t* boxes_met = nullptr;  ///< [1] number of pairs, even if above max_pairs
   const std::uint32_t* a = nullptr;          ///< [max_pairs] index of a body
   const std::uint32_t* b = nullptr;  ///< [max_pairs] a higher index; pairs are sorted by (a, b)
   /// The pairs as a batch takes them: always max_pairs of them, since the host does not know their

@@ -10,7 +10,7 @@
 
 namespace IST_API ist {
 
-/// Which spheres of two trees are intersected.
+/// Settings for the choice of the spheres that are intersected.
 struct LensSettings {
   Measure measure = Measure::matched;  ///< matched or inner
   /// Levels of detail of the matched sets, 0 the finest; 0 for inner spheres, which have one.

@@ -76,9 +76,9 @@ struct SeparationSettings {
   std::uint32_t max_visits = 0;  ///< count of node pairs opened, depth first
   bool inner_spheres = false;    ///< use the inner spheres even if both assets keep a mesh
 
-  /// [u] Of solids that are farther apart than this the answer says no more: distance and
-  /// distance_min are max_distance, distance_max is infinite, points and normal are NaN, the status
-  /// is ok. That is certified, and takes a few microseconds unless the distance is near it.
+  /// [u] For solids that are farther apart than this, distance and distance_min are max_distance,
+  /// distance_max is infinite, points and normal are NaN, and the status is ok. That is certified,
+  /// and takes a few microseconds unless the distance is near it.
   double max_distance = 0;
 
   /// Like PenetrationSettings::pair_id, for distances of surfaces: the nearest triangles are kept,
@@ -164,15 +164,15 @@ struct Penetration {
   /// Non-empty lenses summed, spheres tested against a shape, and spheres that lie wholly in the
   /// other solid. With Measure::exact: crossing triangles.
   std::uint32_t sphere_pairs = 0;
-  /// Measure::exact: the solids meet in points, edges or faces, and the volume is 0. What is nearer
-  /// than the rounding of poses and vertices, some 1e-14 of both sizes and their distance, touches.
-  /// So does what crosses by a volume that is lost in its rounding. Spheres cannot tell: false.
+  /// Measure::exact: the solids meet in points, edges or faces, and the volume is 0. Solids nearer
+  /// than the rounding of poses and vertices, some 1e-14 of both sizes and their distance, touch.
+  /// So do solids that cross by a volume within its rounding. By spheres: false.
   bool touching = false;
 };
 
 /// Gap of two placed solids: between their surfaces if both assets keep a mesh, else between inner
-/// spheres, or inner spheres and a shape. All zero once these overlap. Of solids that are farther
-/// than SeparationSettings::max_distance see there.
+/// spheres, or inner spheres and a shape. All zero once these overlap. For solids that are farther
+/// apart than SeparationSettings::max_distance see there.
 struct Separation {
   double distance = 0;      ///< [u] between surfaces or inner spheres
   double distance_min = 0;  ///< [u] lower bound of the true distance of the solids, certified
@@ -337,8 +337,8 @@ struct ContactPatches {
   std::size_t count = 0;  ///< patches written
 };
 
-/// Condenses the contact into a manifold of at most patches.size() patches; without room for one
-/// the answer is invalid_input.
+/// Condenses the contact into a manifold of at most patches.size() patches; if that is 0, the
+/// answer is invalid_input.
 ///
 /// Volumes, forces and torques sum to the whole's to about 1e-15.
 ///

@@ -30,7 +30,7 @@ struct SceneRule {
   SceneAnswer answer = SceneAnswer::penetration;
   /// Measure and limits. The scene sets no pair_id.
   PenetrationSettings penetration = {};
-  /// [u] ≥ 0: bodies that come as near are told too, with their separation.
+  /// [u] ≥ 0: bodies within this distance are reported too, with their separation.
   double margin = 0;
   ImpactSettings impact = {};  ///< SceneAnswer::impact
 };
@@ -40,7 +40,7 @@ struct SceneBody {
   /// The caller's number, unique in its scene: bodies are named by it, and pairs are in its order.
   std::uint32_t number = 0;
   PlacedSolid solid = {};
-  bool moves = true;          ///< two bodies that do not move are not asked, nor are two shapes
+  bool moves = true;  ///< pairs of bodies that do not move are not queried, nor are two shapes
   std::uint32_t group = 0;    ///< < kSceneGroups: selects the rule of a pair
   std::uint32_t layers = 1;   ///< bits
   std::uint32_t meets = ~0u;  ///< bits: layers of bodies that it meets; both must agree
@@ -71,7 +71,7 @@ struct SceneSettings {
   std::size_t max_pairs = 8192;               ///< pairs of bodies whose boxes meet, in one step
   std::uint32_t patches_per_pair = 8;         ///< at most, for SceneAnswer::patches
   std::size_t workers = 1;                    ///< workspaces: as many threads may work at a step
-  std::size_t workspace_capacity = 1u << 20;  ///< as Workspace has it
+  std::size_t workspace_capacity = 1u << 20;  ///< see Workspace
 };
 
 /// The results of a step. The spans stay until the next call of a function that is not const.
@@ -81,8 +81,8 @@ struct SceneStep {
   std::span<const std::uint32_t>
       refused;  ///< left out: pose, scale, motion or shape not usable, or beyond 1e37 [u]
   std::size_t boxes_met = 0;  ///< pairs of bodies whose boxes meet
-  /// Not all pairs had room (SceneSettings::max_pairs): nothing was asked, `pairs` is empty, and no
-  /// pair ended.
+  /// There were too many pairs (SceneSettings::max_pairs): none was queried, `pairs` is empty, and
+  /// no pair ended.
   bool pairs_exceeded = false;
 };
 
@@ -100,10 +100,10 @@ struct SceneNearest {
 /// Many solids, and which of them meet: a broad phase over the queries of pairs, and no more.
 /// Bodies, islands, sleeping and solving stay with the host.
 ///
-/// Boxes of bodies stand in two hierarchies, of those that move and those that do not. A step asks
-/// the pairs whose boxes meet and of which a body was added or moved; of the others the answers are
-/// those of the step before. Poses and rules alone decide the answers: they have the same bits and
-/// order for any number of workers and any order of insertion.
+/// Boxes of bodies are in two hierarchies, of those that move and those that do not. A step queries
+/// the pairs whose boxes meet and one of whose bodies was added or moved; the others keep the
+/// answers of the step before. Poses and rules alone decide the answers: they have the same bits
+/// and order for any number of workers and any order of insertion.
 ///
 /// A step allocates nothing, locks nothing but what the pool does, and throws nothing. A scene is
 /// one thread's at a time; const functions may run on several. Assets must outlive their bodies.
@@ -133,9 +133,9 @@ class Scene {
   std::vector<std::uint32_t> numbers() const;  ///< of all bodies, the lowest first
   std::optional<SceneBody> body(std::uint32_t number) const;
 
-  /// The rule for bodies of two groups, whichever is which. Asks all pairs again. Throws Error for
-  /// groups that are too large, an answer or measure without a name, a margin that is negative or
-  /// NaN, or a duration that is not above 0.
+  /// The rule for bodies of two groups, whichever is which. Queries all pairs again. Throws Error
+  /// for groups that are too large, an answer or measure without a name, a margin that is negative
+  /// or NaN, or a duration that is not above 0.
   void set_rule(std::uint32_t group_a, std::uint32_t group_b, const SceneRule& rule);
   /// Bodies that are joined: as long as both are there they do not meet. Throws std::bad_alloc.
   void exclude(std::uint32_t a, std::uint32_t b);
@@ -145,10 +145,10 @@ class Scene {
   void set_filter(bool (*filter)(const void* context, std::uint32_t a, std::uint32_t b) noexcept,
                   const void* context) noexcept;
 
-  /// Asks all pairs that may have changed.
+  /// Queries all pairs that may have changed.
   SceneStep step(const ParallelFor& parallel = {}) noexcept;
-  /// Answers to a pair of the last step: all zero where its rule asks no such thing. Of bodies that
-  /// overlap the separation is zero.
+  /// Answers to a pair of the last step: all zero if its rule requests none. The separation of
+  /// overlapping bodies is zero.
   Penetration penetration(const ScenePair& pair) const noexcept;
   Separation separation(const ScenePair& pair) const noexcept;
   TimeOfImpact impact(const ScenePair& pair) const noexcept;

@@ -123,7 +123,7 @@ bool vdb_available() noexcept;
 /// The level set of an OpenVDB file: its one grid, of floats and marked as a level set, with any
 /// linear transform. [u] is the file's world unit.
 ///
-/// load_mesh() reads a .vdb this way too, so every function that takes a mesh file takes such a
+/// load_mesh() reads a .vdb likewise, so every function that takes a mesh file takes such a
 /// file. OpenVDB reads the file: do not use it for untrusted files.
 ///
 /// Throws Error (file, what is wrong, remedy) for a file of several grids or none, a grid of

@@ -12,7 +12,8 @@
 namespace IST_API ist {
 
 /// The motion that takes an object from one pose to another in the time `duration` > 0: `about`
-/// moves straight, and the object turns at constant speed about one axis, the shorter way (slerp).
+/// moves straight, and the object turns at constant speed about one axis, on the shorter arc
+/// (slerp).
 ///
 /// It ends at `to` up to rounding. `scale` is the object's (PlacedAsset::scale). An invalid
 /// pose or duration yields a Motion that queries reject.

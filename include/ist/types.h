@@ -79,8 +79,8 @@ enum class QueryStatus : std::uint32_t {
   budget_exhausted = 1,
   /// All numbers of the answer are NaN, its counts 0. The cause is a pose with NaN or Inf; a
   /// quaternion of length 0; a scale ≤ 0; an empty tree; a shape's number out of range; sizes or
-  /// distances more than 1e60 : 1 apart; a measure that has no name; a setting < 0 or NaN; contact
-  /// patches without room for one; or a workspace that was moved from.
+  /// distances more than 1e60 : 1 apart; a measure that has no name; a setting < 0 or NaN; a
+  /// capacity of 0 contact patches; or a workspace that was moved from.
   invalid_input = 2,
   /// A solid lacks what the measure needs. Measure::exact needs both solids' meshes
   /// (AssetView::has_mesh; a shape has none), the others need spheres. All numbers of the

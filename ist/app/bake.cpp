@@ -52,7 +52,7 @@ Json partners_json(const std::vector<PartnerError>& partners) {
 }
 
 Baked bake_interruptibly(const ClosedMesh& mesh, const BakeSettings& settings, bool quiet) {
-  constexpr double kPatience = 0.15;  // [s] some steps take seconds, and leave nothing half done
+  constexpr double kPatience = 0.15;  // [s] some steps take seconds, and leave no incomplete files
   return interruptibly(
       kPatience, quiet, settings.target.relative_error > 0,
       [&](const ProgressCallback& progress) { return bake_as_asked(mesh, settings, progress); });
@@ -67,8 +67,8 @@ void require_folder(const std::string& folder) {
 }
 
 /// Bakes every mesh of every link of the URDF, in the link's frame, and writes assets and the
-/// index, all or nothing: files are written once the last bake is done. Boxes, cylinders and
-/// spheres become field descriptions of the command line with a pose. Throws Error.
+/// index, all or nothing: files are written after the last bake. Boxes, cylinders and spheres
+/// become shape descriptions of the command line with a pose. Throws Error.
 void bake_robot(const BakeOptions& options, const BakeSettings& settings) {
   const auto start = std::chrono::steady_clock::now();
   const RobotModel robot = read_robot_for(options.robot, options.mesh);
@@ -139,7 +139,7 @@ void run_bake(const BakeOptions& options) {
   const auto [asset, partners] = bake_interruptibly(mesh, settings, options.quiet);
   const double bake_seconds = seconds_since(start) - import_seconds;
   {
-    const InterruptGuard guard;  // the file is written whole, or not at all
+    const InterruptGuard guard;  // the file is written completely or not at all
     if (!options.closed_mesh.empty()) write_mesh(mesh.mesh, options.closed_mesh);
     asset.save(options.output);
   }

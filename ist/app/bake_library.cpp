@@ -40,11 +40,11 @@ std::string in_words(double time) {
   return fmt::format("{} h {} min", s / 3600, s % 3600 / 60);
 }
 
-/// On a terminal one line on stderr that is written over and over, with rate and time left, and
-/// what failed above it; elsewhere a line an asset.
+/// On a terminal, one line on stderr that is updated with rate and remaining time, below messages
+/// of failures; otherwise one line an asset.
 class LibraryProgress final : public RunObserver {
  public:
-  /// `lines`: a line of JSON an asset on stdout.
+  /// `lines`: one line of JSON on stdout for each asset.
   LibraryProgress(std::size_t jobs, bool quiet, bool lines)
       : jobs_(jobs), quiet_(quiet), lines_(lines), line_(!quiet && isatty(STDERR_FILENO) == 1) {}
 
@@ -91,7 +91,7 @@ class LibraryProgress final : public RunObserver {
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// [1/s] of the last half minute; 0: nothing ended
+  /// [1/s] of the last half minute; 0: no job ended
   double rate() {
     const Clock::time_point now = Clock::now();
     while (!ends_.empty() && seconds(now - ends_.front()) > kWindow) ends_.pop_front();
@@ -119,7 +119,7 @@ std::optional<Shard> parse_shard(std::string_view text) {
   return Shard{*index, *count};
 }
 
-/// All mistakes at once, before anything is written.
+/// Reads a manifest and reports all its mistakes, before anything is written.
 Manifest read_sound_manifest(const std::string& path) {
   Manifest manifest = read_manifest(path);
   if (manifest.faults.empty()) return manifest;
@@ -144,7 +144,7 @@ std::vector<std::string> stale_assets(const std::string& folder, const Manifest&
   return stale;
 }
 
-/// Those that are left: all, or none.
+/// Returns the remaining files: all, or none.
 std::vector<std::string> settle_stale(std::vector<std::string> stale, bool remove) {
   if (stale.empty()) return stale;
   constexpr std::size_t kShown = 3;
@@ -164,7 +164,7 @@ std::vector<std::string> settle_stale(std::vector<std::string> stale, bool remov
   return {};
 }
 
-/// Where none of the robot's assets in this run failed.
+/// Writes the index if none of the robot's assets in this run failed.
 void write_index(const RobotAssets& robot, const std::string& folder,
                  const std::vector<JobResult>& results) {
   for (const JobResult& result : results)
@@ -183,7 +183,7 @@ void make_folder(const std::string& path) {
     throw Error(path + ": no permission to write to this folder; name another with -o");
 }
 
-/// An empty name counts as none, as in other programs.
+/// An empty name counts as unset, as in other programs.
 std::string cache_folder(const LibraryOptions& options) {
   const char* const from_environment = std::getenv("IST_CACHE");
   if (!options.cache.empty()) return options.cache;

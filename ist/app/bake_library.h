@@ -26,15 +26,15 @@ struct LibraryRun {
   bool json, quiet;
 };
 
-/// Bakes the manifest's assets. Throws Error, and ExitCode: 1 where an asset failed, 2 where the
-/// manifest has mistakes, 130 after Ctrl-C.
+/// Bakes the manifest's assets. Throws Error, and ExitCode: 1 if an asset failed, 2 if the manifest
+/// has mistakes, 130 after Ctrl-C.
 void run_library(const LibraryRun& run);
 
 /// Warnings about a baked asset: a missed target, coarse spheres, overlapping parts.
 std::vector<std::string> warnings_of(const AssetView& tree);
 
-/// On stdout, as JSON or as a table for a person; nothing where a person wants quiet.
-/// `failed`: only assets that are not done are listed; all are counted.
+/// Prints to stdout, as JSON or as a table; nothing if `quiet` and no JSON. `failed`: only assets
+/// that are not done are listed; all are counted.
 void print_summary(const Summary& summary, bool json, bool quiet, bool failed = false);
 
 }  // namespace ist::app

@@ -49,7 +49,7 @@ std::vector<Triangle> triangles_of(const PlacedAsset& solid) {
   return out;
 }
 
-/// The pieces of a triangle that lie in a solid, to a size of `finest`.
+/// Adds the pieces of a triangle that lie in a solid, down to size `finest`.
 void add_inside(const Triangle& t, const PlacedAsset& solid, const Eigen::AlignedBox3d& near,
                 double finest, std::vector<Triangle>& out) {
   Eigen::AlignedBox3d box(t[0]);
@@ -86,7 +86,7 @@ void add_mesh(GlbScene& scene, const std::string& name, const std::array<double,
   scene.add_node(0, {{"name", name}, {"mesh", scene.add_mesh(name, colour, vertices, corners)}});
 }
 
-/// Parts in grey, and in red what of each one's surface lies in another.
+/// Draws parts in grey, and those parts of their surfaces that lie in others in red.
 std::string drawn(const Assembly& assembly, const ClashReport& report) {
   constexpr std::array<double, 4> kGrey = {0.6, 0.6, 0.6, 0.35}, kRed = {0.9, 0.1, 0.1, 1};
   constexpr double kPieces = 48;
@@ -146,7 +146,7 @@ void clash(const ClashOptions& options) {
   fmt::print("{}", options.json  ? json_text(clashes_json(report)) + "\n"
                    : options.csv ? clashes_csv(report)
                                  : clashes_text(report));
-  if (options.csv)  // the other forms have them
+  if (options.csv)  // the other formats contain them
     for (const auto& [part, what] : report.faults)
       fmt::print(stderr, "not answered: {}: {}\n", part, what);
   if (report.new_clashes() > 0) throw ExitCode{kExitViolation};

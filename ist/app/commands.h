@@ -3,9 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 
-// The subcommands of `ist`. Each function adds one, with its options; the callback that it leaves
-// behind does the work when the command line names it. A callback throws ist::Error for what goes
-// wrong (exit 1) and ExitCode to end with another code.
+// The subcommands of `ist`. Each function adds one with its options; its callback does the work. A
+// callback throws ist::Error for errors (exit 1) and ExitCode to end with another code.
 
 namespace ist::app {
 
@@ -33,6 +32,6 @@ void add_medial(CLI::App& app);
 void add_export(CLI::App& app);
 void add_sample(CLI::App& app);
 void add_spheres(CLI::App& app);
-void add_reference(CLI::App& app);  ///< completion and manual: of all commands that were added
+void add_reference(CLI::App& app);  ///< completion and manual, for all commands added before
 
 }  // namespace ist::app

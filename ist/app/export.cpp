@@ -26,9 +26,9 @@ std::array<double, 4> colour_of(std::size_t level) {
   return {c[0], c[1], c[2], level == 0 ? 1.0 : 0.2};
 }
 
-/// A tree as a binary glTF 2.0 scene: one ball's mesh a level, in a material of its own, and a node
-/// a sphere or node of the tree that is an instance of it. In the mesh's own unit and frame,
-/// coordinates as floats about the asset's middle, where the node above them all stands.
+/// A tree as a binary glTF 2.0 scene: one ball's mesh per level, with its own material, and one
+/// node per sphere or node of the tree that instances it. In the mesh's own unit and frame, with
+/// float coordinates about the asset's middle, which the root node places.
 ///
 /// `detail` in [0, header().detail_count], 0 for Measure::inner. The file's bytes.
 std::string tree_glb(const AssetView& view, Measure measure, std::uint32_t detail,
@@ -37,7 +37,7 @@ std::string tree_glb(const AssetView& view, Measure measure, std::uint32_t detai
   const TreeHeader& tree =
       measure == Measure::inner ? header.inner_tree : matched_tree(header, detail);
   const double scale = std::ldexp(1.0, header.exponent);
-  constexpr int kMostExponent = 100;  // of the floats that viewers square
+  constexpr int kMostExponent = 100;  // viewers square floats
   if (std::abs(header.exponent) > kMostExponent)
     throw Error(name + ": its size of about 2^" + std::to_string(header.exponent) +
                 " u is out of range for a .glb (2^-100 to 2^100); export .csv, .ply or .json");
@@ -69,7 +69,8 @@ struct ExportOptions {
 
 using Format = std::string (*)(std::span<const ExportedSphere>);
 
-/// By the file's ending; standard output gets CSV; none for a scene. Throws Error.
+/// The format by the file's extension; CSV for standard output, which cannot be a scene. Throws
+/// Error.
 Format format_of(const std::string& output) {
   const std::string ending = ending_of(output);
   if (ending == ".csv" || is_standard_output(output)) return spheres_csv;

@@ -11,17 +11,17 @@
 
 namespace ist::app {
 
-/// A binary glTF 2.0 scene in the making. Node 0 is its root.
+/// A binary glTF 2.0 scene under construction. Node 0 is its root.
 class GlbScene {
  public:
   using Json = nlohmann::ordered_json;
 
-  /// `root`: what stands in node 0.
+  /// `root`: the contents of node 0.
   explicit GlbScene(Json root) { nodes_.push_back(std::move(root)); }
 
-  /// A mesh of one material: a ball of radius 1, the same one whatever its material, …
+  /// Adds a mesh with one material: a ball of radius 1, shared by all materials.
   std::size_t add_ball(const std::string& name, const std::array<double, 4>& colour);
-  /// … or triangles, with flat faces.
+  /// Adds a mesh of triangles with flat shading.
   std::size_t add_mesh(const std::string& name, const std::array<double, 4>& colour,
                        std::span<const Eigen::Vector3d> vertices,
                        std::span<const std::array<std::uint32_t, 3>> triangles);
@@ -35,7 +35,7 @@ class GlbScene {
  private:
   std::size_t add_material(const std::string& name, const std::array<double, 4>& colour);
   std::size_t add_view(const void* bytes, std::size_t count, int target);
-  /// Accessors of the vertices and, after it, of the triangles: the first one's number.
+  /// Adds accessors of the vertices and the triangles, and returns the index of the first.
   template <class Index>
   std::size_t add_triangles(std::span<const Eigen::Vector3d> vertices,
                             std::span<const std::array<Index, 3>> triangles);
@@ -46,7 +46,7 @@ class GlbScene {
        accessors_ = Json::array(), views_ = Json::array();
   std::vector<std::vector<std::size_t>> children_ = {{}};
   std::string data_;
-  std::size_t ball_ = SIZE_MAX;  ///< its vertices among the accessors; its triangles follow
+  std::size_t ball_ = SIZE_MAX;  ///< accessor of its vertices; that of its triangles follows
 };
 
 }  // namespace ist::app

@@ -31,7 +31,7 @@ void on_interrupt(int) {
 
 void install_interrupt_handler() {
   std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);  // of Slurm, Kubernetes and timeout
+  std::signal(SIGTERM, on_interrupt);  // from Slurm, Kubernetes and timeout
   std::signal(SIGALRM, on_timer);
 }
 

@@ -2,15 +2,14 @@
 
 namespace ist::app {
 
-/// Ctrl-C or SIGTERM ends the program with exit code 130 at once, unless an InterruptGuard is
-/// alive.
+/// Ctrl-C or SIGTERM ends the program with exit code 130 at once, unless an InterruptGuard exists.
 void install_interrupt_handler();
 
-/// While one is alive, the first Ctrl-C only sets interrupted(), so that a long stage can end
-/// cleanly and no temporary file stays behind; the second ends the program.
+/// While a guard exists, the first Ctrl-C only sets interrupted(), so that a long stage can end
+/// cleanly and no temporary file remains; the second ends the program.
 ///
-/// `patience` [s]: a stage that has not ended so long after the first is ended as by the second;
-/// 0: it is waited for. Not for stages that write files.
+/// `patience` [s]: a stage that has not ended so long after the first is ended as by the second; 0:
+/// waits for it. Not for stages that write files.
 class InterruptGuard {
  public:
   explicit InterruptGuard(double patience = 0);

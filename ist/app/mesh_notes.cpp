@@ -17,7 +17,7 @@ std::string without_numbers(std::string text) {
   return text;
 }
 
-/// close_as_asked(); if both are asked for, the better of repair and wrap.
+/// close_as_asked(); if both are requested, the better of repair and wrap.
 ClosedMesh close_better(TriangleMesh mesh, const std::string& name, const MeshSettings& settings) {
   if (!settings.repair || settings.wrap == 0)
     return close_as_asked(std::move(mesh), name, settings);

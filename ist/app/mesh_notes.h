@@ -9,39 +9,39 @@
 
 namespace ist::app {
 
-/// Closes the meshes of a robot's links, and says what was found once all have been looked at:
-/// faults of each link, and warnings that differ in numbers alone in one line.
+/// Closes the meshes of a robot's links, and reports the results for all of them together: faults
+/// of each link, and warnings that differ only in numbers in one line.
 class LinkMeshes {
  public:
-  /// `repaired`: links that are repaired, whatever the settings.
+  /// `repaired`: links that are repaired whatever the settings.
   LinkMeshes(std::string robot, MeshSettings settings, std::vector<std::string> repaired)
       : robot_(std::move(robot)), settings_(settings), repaired_(std::move(repaired)) {}
 
   /// Returns a substitute for a mesh that cannot be closed, given the reason; nothing: an error.
   using Otherwise = std::function<std::optional<ClosedMesh>(const std::string& why)>;
 
-  /// The mesh that `make` returns, closed; if both are asked for, by the better of repair and wrap.
-  /// Nothing where either throws Error, which is a fault of each of these links.
+  /// The mesh that `make` returns, closed; if both are requested, by the better of repair and wrap.
+  /// Nothing if either throws Error, which is a fault of each of these links.
   std::optional<ClosedMesh> close(const std::vector<std::string>& links,
                                   const std::function<TriangleMesh()>& make,
                                   const Otherwise& otherwise = {});
 
   bool repairs(const std::vector<std::string>& links) const;
 
-  /// A finding about a link, which finish() says.
+  /// Records a finding about a link, which finish() reports.
   void warn(const std::string& link, const std::string& note);
 
-  /// Says what was found since it was last called. Throws Error if any link failed.
+  /// Reports the findings since the last call. Throws Error if any link failed.
   void finish();
 
   const std::vector<std::string>& said() const { return said_; }
 
  private:
   struct Warning {
-    /// The first of its kind by its letters, so that of the lowest confidence, and whose it is.
+    /// The first of its kind alphabetically, i.e. of the lowest confidence, and its link.
     std::string note, link;
     std::vector<std::string> links;
-    bool differs = false;  ///< the others' in its numbers
+    bool differs = false;  ///< other links' numbers differ
   };
   const std::string robot_;
   const MeshSettings settings_;
@@ -50,22 +50,22 @@ class LinkMeshes {
   std::map<std::string, Warning> warnings_;
 };
 
-/// Says which links of a robot are left out, because they have visual shapes alone.
+/// Warns which links of a robot are skipped because they have only visual shapes.
 void warn_of_left_out(const std::vector<std::string>& links, const std::string& robot);
 
 /// read_input_mesh(); notes about the mesh go to stderr as warnings. Throws Error.
 InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings);
 
-/// How a mesh that was not closed was closed, and with what confidence; "" for one that was.
+/// How an open mesh was closed, and with what confidence; "" for a closed one.
 std::string describe_closing(const MeshReport& report);
 
-/// The same with all that stands behind it; nulls for a mesh that was closed.
+/// The same with all figures; nulls for a closed mesh.
 nlohmann::ordered_json closing_json(const MeshReport& report);
 
 /// Describes the axes and unit that a file declares and how they were used; "" if it declares none.
 std::string describe_declared(const DeclaredFrame& declared);
 
-/// The same; null is what it does not declare.
+/// The same; null for everything that it does not declare.
 nlohmann::ordered_json declared_json(const DeclaredFrame& declared);
 
 }  // namespace ist::app

@@ -12,7 +12,7 @@ namespace ist::app {
 
 inline constexpr const char* kWipe = "\r\033[K";  ///< a line on a terminal
 
-/// One line on stderr that is written over and over, where stderr is a terminal; nothing elsewhere.
+/// One line on stderr that is continually updated if stderr is a terminal; nothing otherwise.
 class ProgressLine {
  public:
   /// `rounds`: see WholeProgress.
@@ -26,7 +26,7 @@ class ProgressLine {
 
   void show(const Progress& progress) {
     if (!active_) return;
-    std::string packed;  // the other stages know neither
+    std::string packed;  // the other stages have neither
     if (std::string_view(progress.stage) == "pack")
       packed = fmt::format("coverage {:.2f} %  radius {:.3g}  ", 100 * progress.coverage,
                            progress.radius);

@@ -18,7 +18,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Numbers of a kind of field, as a user writes them.
+/// The numbers of a kind of shape, in the user's notation.
 struct FieldKind {
   const char* name;
   std::vector<const char*> numbers;
@@ -48,7 +48,7 @@ const FieldKind* kind_of(std::string_view text) {
   return nullptr;
 }
 
-/// A description, and what its errors say.
+/// A description, and the error messages about it.
 class Spec {
  public:
   Spec(const std::string& text, const FieldKind& kind) : text_(text), kind_(kind) {
@@ -72,7 +72,7 @@ class Spec {
 
   double number(std::size_t k) const { return values_[k]; }
 
-  /// [u] above 0, or from 0 on.
+  /// [u] positive, or nonnegative.
   double length(std::size_t k, bool may_be_zero = false) const {
     const double value = values_[k];
     if (!(may_be_zero ? value >= 0 : value > 0))
@@ -94,7 +94,7 @@ class Spec {
   }
 
  private:
-  static constexpr double kLongest = 1e150;  // [u] what the queries take
+  static constexpr double kLongest = 1e150;  // [u] limit of the queries
 
   [[noreturn]] void fail(const std::string& fault) const {
     throw Error(fmt::format("'{}' is not a {}: {}; write {}:{}, {}", text_, kind_.name, fault,
@@ -106,10 +106,10 @@ class Spec {
   std::vector<double> values_;
 };
 
-/// Whether an argument describes a field and names no file: it begins with a kind and a colon.
+/// True if an argument describes a shape and not a file: it begins with a kind and a colon.
 bool is_field_spec(const std::string& text) { return kind_of(text) != nullptr; }
 
-/// Throws Error that says what of the description is wrong and what is expected.
+/// Throws Error that states the fault of the description and what is expected.
 Shape parse_field(const std::string& text) {
   const FieldKind* const kind = kind_of(text);
   if (kind == nullptr) throw Error("'" + text + "' does not describe a shape");
@@ -143,7 +143,7 @@ std::string is_pose(const std::string& text) {
   }
 }
 
-/// "", or what is wrong with a description of a field; file names are none.
+/// "", or the fault of a description of a shape; "" for file names.
 std::string field_fault(const std::string& text) {
   try {
     if (is_field_spec(text)) parse_field(text);
@@ -162,7 +162,7 @@ std::string not_an_asset(const std::string& text) {
       text);
 }
 
-/// Throws Error if no row is of one of the classes: most likely it is misspelled.
+/// Throws Error if no row has one of the classes, which is probably misspelled.
 void keep_classes(PoseTable& table, const QueryOptions& options) {
   if (!table.has_labels) throw Error(options.poses + ": no column 'class', which --class needs");
   const auto is_of = [](const std::string& name) {
@@ -190,8 +190,8 @@ std::vector<PoseRow> asked_rows(const QueryOptions& options) {
   return table.rows;
 }
 
-/// Answers every row, `repeat` rounds over all rows in turn, so that no row finds the branch
-/// predictor trained by itself. A row's time is the least of its rounds.
+/// Answers every row, in `repeat` rounds over all rows in turn, so that no row trains the branch
+/// predictor for itself. A row's time is the minimum over the rounds.
 std::vector<Answer> answer(const PlacedSolid& a, const AssetView& b,
                            const std::vector<PoseRow>& rows, const QueryOptions& options) {
   using Clock = std::chrono::steady_clock;
@@ -213,7 +213,7 @@ std::vector<Answer> answer(const PlacedSolid& a, const AssetView& b,
   return answers;
 }
 
-/// Throws CLI::ValidationError where settings exclude each other.
+/// Throws CLI::ValidationError if settings exclude each other.
 void check_settings(const QueryOptions& options) {
   const PenetrationSettings& settings = options.settings.penetration;
   const bool exact = settings.measure == Measure::exact;
@@ -238,7 +238,7 @@ void check_settings(const QueryOptions& options) {
     if (given) throw CLI::ValidationError(option, "has no effect where A is a shape: " + options.a);
 }
 
-/// Throws Error if an asset does not hold what the measure asks.
+/// Throws Error if an asset lacks the data that the measure needs.
 void require_held(const std::string& path, const AssetView& tree, Measure measure) {
   if (measure != Measure::exact) {
     if (tree.sphere_count() > 0) return;
@@ -257,7 +257,7 @@ void require_held(const std::string& path, const AssetView& tree, Measure measur
               "use --measure matched");
 }
 
-/// Says once on stderr where spheres alone are asked for what they cannot tell.
+/// Warns once on stderr if spheres alone are requested where they are inaccurate.
 void warn_of_misfit(const AssetView& a, const AssetView& b, const std::vector<PoseRow>& rows,
                     const QueryOptions& options) {
   const PenetrationSettings& settings = options.settings.penetration;
@@ -284,7 +284,7 @@ std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions&
   }
   const Asset a = Asset::load(options.a);
   const Asset b = Asset::load(options.asset_b);
-  // Surfaces alone are exact enough.
+  // Mesh-only queries are exact.
   const bool surfaces =
       options.settings.penetration.relative_error > 0 && a.view().has_mesh() && b.view().has_mesh();
   if (!surfaces) {

@@ -25,7 +25,7 @@ constexpr std::array kPose = {"qw", "qx", "qy", "qz", "tx", "ty", "tz"};
 
 double& component(Pose& pose, std::size_t k) { return k < 4 ? pose.q[k] : pose.t[k - 4]; }
 
-/// Without what spellings differ in: "Scale B" and "scale_b" are one.
+/// Normalises a name: "Scale B" and "scale_b" are equal.
 std::string plain(const std::string& name) {
   std::string result;
   for (const char c : name)
@@ -34,8 +34,8 @@ std::string plain(const std::string& name) {
   return result;
 }
 
-/// Where a column stands. One that is there twice, or in another spelling, is an error: to pass it
-/// over would answer another question than was asked.
+/// The index of a column. A duplicate, or one in another spelling, is an error: skipping it would
+/// answer another question than asked.
 std::optional<std::size_t> find_column(const std::vector<std::string>& header,
                                        const std::string& name, const CsvReader& file) {
   std::optional<std::size_t> found;
@@ -78,7 +78,7 @@ PoseTable read(std::istream& text, const std::string& name) {
   while (file.next(fields)) {
     if (fields.size() != header.size())
       file.fail(fmt::format("{} fields, but the header has {}", fields.size(), header.size()));
-    // nan and inf are numbers here: judging a pose is the query's part.
+    // nan and inf are valid numbers here: the query judges the pose.
     const auto number = [&](std::size_t column) {
       const std::optional<double> value = parse_number(fields[column]);
       if (!value)
@@ -113,7 +113,7 @@ std::vector<std::pair<std::string, double>> numbers(const PenetrationAndSeparati
   return out;
 }
 
-/// Those behind `time_us`: how the solids touch, which spheres cannot know.
+/// The columns after `time_us`: how the solids touch, which spheres cannot determine.
 std::vector<std::pair<std::string, double>> contact_numbers(const Answer& answer) {
   const Penetration& p = answer.result.penetration;
   const auto known = [&](double value) { return answer.exact ? value : std::nan(""); };

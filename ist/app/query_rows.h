@@ -6,7 +6,7 @@
 
 namespace ist::app {
 
-/// One question to ask: x_A = R (scale_b · x_B) + t.
+/// One query: x_A = R (scale_b · x_B) + t.
 struct PoseRow {
   std::string id, label;  ///< columns `id` and `class`, free text
   Pose pose;
@@ -15,29 +15,29 @@ struct PoseRow {
 
 struct PoseTable {
   std::vector<PoseRow> rows;
-  bool has_labels = false, has_scales = false;  ///< whether there are columns `class`, `scale_b`
+  bool has_labels = false, has_scales = false;  ///< true if columns `class`, `scale_b` exist
 };
 
 /// "qw,qx,qy,qz,tx,ty,tz". Throws Error.
 Pose parse_pose(const std::string& text);
 
 /// Reads a CSV, "-" from standard input, with at least the columns qw,qx,qy,qz,tx,ty,tz; id (else
-/// the row's number), class and scale_b (else 1) are taken where they stand, further columns are
-/// ignored. Throws Error that names the line; so do columns that are there twice or spelled almost
-/// like one of these, and a file without rows.
+/// the row's number), class and scale_b (else 1) are optional, other columns are ignored. Throws
+/// Error that names the line; also for duplicate columns, columns spelled almost like one of these,
+/// and a file without rows.
 PoseTable read_pose_table(const std::string& path);
 
-/// Which of the row's numbers is at fault, and why, where a query calls it invalid.
+/// The invalid number of a row that a query rejects, and the reason.
 std::string pose_fault(const PoseRow& row);
 
 struct Answer {
   PoseRow row;
   PenetrationAndSeparation result;
   double time_us = 0;     ///< [µs] wall time of this one query
-  bool surfaces = false;  ///< the distance is that of surfaces, else of inner spheres
-  bool exact = false;     ///< the measure is: it knows what touches
+  bool surfaces = false;  ///< the distance is between surfaces, else between inner spheres
+  bool exact = false;     ///< by the exact measure, which detects touching
 
-  /// Surfaces alone have no spheres to be apart.
+  /// Mesh-only assets have no distance of spheres.
   bool has_distance() const { return result.separation.status != QueryStatus::missing_data; }
   /// The more severe status of the parts that were queried.
   QueryStatus status() const {

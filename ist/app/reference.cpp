@@ -24,7 +24,7 @@ std::string words(const std::vector<CommandReference>& commands) {
   return out;
 }
 
-/// The help up to its first stop: what fits beside an option. "e.g. 1%" has none.
+/// The help up to its first full stop: the part that fits beside an option. "e.g. 1%" has none.
 std::string short_help(const std::string& help) {
   for (std::size_t i = 0; i < help.size(); ++i) {
     const bool sentence_ends = help[i] == '.' && i + 2 < help.size() && help[i + 1] == ' ' &&
@@ -49,7 +49,7 @@ std::string shell_quoted(const std::string& text) {
   return fmt::format("'{}'", out);
 }
 
-// Scripts that complete a command line of `ist`: for bash, zsh and fish.
+// Completion scripts for `ist`: for bash, zsh and fish.
 std::string bash_completion(const std::vector<CommandReference>& commands) {
   std::string out = "# bash completion of ist\n_ist() {\n";
   out += "  local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]}\n";
@@ -157,7 +157,7 @@ std::string fish_completion(const std::vector<CommandReference>& commands) {
   return out;
 }
 
-/// Text that roff takes as it is: hyphens that can be copied, no escapes, no requests.
+/// Text escaped for roff: hyphens that can be copied, no escapes, no requests.
 std::string roff(const std::string& text) {
   std::string out;
   bool line_begins = true;
@@ -209,8 +209,8 @@ void write_manual(const CLI::App& app, const std::string& folder) {
     write_text((in / ("ist-" + command.name + ".1")).string(), man_page(command));
 }
 
-/// "TEXT:{a,b}" and "a|b|SOMETHING" say what there is to choose from; words in capitals stand for
-/// others, letters for themselves.
+/// "TEXT:{a,b}" and "a|b|SOMETHING" list the choices; words in capitals are placeholders, others
+/// literal.
 void split_type(const std::string& type, OptionReference& out) {
   const std::size_t open = type.find(":{");
   const bool listed = open != std::string::npos;

@@ -11,11 +11,11 @@ struct OptionReference {
   bool positional = false, required = false;
   bool takes_value = false;
   std::string value;                 ///< "INT", "TEXT", …; empty without one
-  std::vector<std::string> choices;  ///< all values there are, where they are few
-  std::string standard;              ///< what it is if it is not given; empty: nothing to say
+  std::vector<std::string> choices;  ///< all values, if they are few
+  std::string standard;              ///< the default; empty: none to document
   std::string help;
 
-  /// Whether a value may be the name of a file.
+  /// True if a value may be the name of a file.
   bool takes_text() const { return value == "TEXT" && choices.empty(); }
 };
 

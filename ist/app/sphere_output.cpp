@@ -17,19 +17,19 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The spheres for a link's file; beside capsules, only those of the description.
+/// The spheres for a link's file; with capsules, only those of the description.
 const std::vector<CoverSphere>& spheres_of(const SphereLink& link) {
   return link.capsules.empty() ? link.cover.spheres : link.given;
 }
 
-/// How a link that was not closed was closed; method "capsule": it could not be.
+/// How an open link was closed; method "capsule": it could not be.
 Json link_closing_json(const SphereLink& link) {
   Json json = closing_json(link.closing);
   if (link.bounding_capsule) json["method"] = "capsule";
   return json;
 }
 
-/// Numbers that are not known become null.
+/// Unknown numbers become null.
 Json number_or_null(double x) { return std::isfinite(x) ? Json(x) : Json(); }
 
 Json link_json(const SphereLink& link) {
@@ -144,7 +144,7 @@ std::string robot_yaml(const SphereRobot& robot) {
   return curobo_robot(robot.robot, urdf.generic_string(), robot.spheres(), robot.self);
 }
 
-/// Describes the pairs that planners are to ignore, and how accurate that is.
+/// Describes the pairs that planners should ignore, and how accurate that is.
 std::string self_collision_text(const SphereRobot& robot) {
   const SelfCollision& self = robot.self;
   std::map<std::string, std::size_t> ignored;
@@ -153,7 +153,7 @@ std::string self_collision_text(const SphereRobot& robot) {
     if (!pair.ignored.empty()) ++ignored[pair.ignored];
     if (pair.missed + pair.falsely > 0) wrong.push_back(&pair);
   }
-  const LinkPair* excluded = nullptr;  // that overlaps most often
+  const LinkPair* excluded = nullptr;  // the pair that overlaps most often
   std::size_t overlapping = 0;
   for (const LinkPair& pair : self.pairs) {
     if (pair.ignored != "Excluded" || pair.colliding == 0) continue;

@@ -15,21 +15,20 @@ struct SphereLink {
   bool has_mesh = false;
   double slack = 0;               ///< [u] by which the mesh may be wider than the shapes
   TriangleMesh read = {};         ///< as read, if it was not closed; the cover contains it too
-  MeshReport closing = {};        ///< how it was closed, if it was not
-  bool bounding_capsule = false;  ///< that stands for a mesh that could not be closed
+  MeshReport closing = {};        ///< how it was closed, if it was open
+  bool bounding_capsule = false;  ///< the capsule replaces a mesh that could not be closed
   SphereCover cover;
   std::vector<CoverCapsule> capsules = {};  ///< if any, `cover` has spheres that contain them
   SphereCoverProof proof;
 };
 
-/// Two links whose solids come so close that only many spheres would keep them apart.
+/// Two links whose solids come so close that separating them takes many spheres.
 struct ClosePair {
   std::string a, b;
-  double gap;           ///< [u] in which both protrude, where a tenth of the free poses is given up
-  std::size_t spheres;  ///< of both that this takes, about
+  double gap;           ///< [u] in which both protrude, if a tenth of the free poses is given up
+  std::size_t spheres;  ///< approximate number of both together
 };
 
-/// Input and result of `ist spheres`.
 struct SphereRobot {
   std::string name, input, output;  ///< of the robot or the mesh; paths
   std::vector<SphereLink> links;    ///< those with shapes
@@ -53,7 +52,6 @@ struct SphereRobot {
 using SphereWriter = std::string (*)(const SphereRobot&);
 SphereWriter sphere_writer(const std::string& output);
 
-/// The report: a table, or JSON.
 std::string spheres_table(const SphereRobot& robot, const std::string& output, double seconds);
 std::string spheres_report_json(const SphereRobot& robot, const std::string& output,
                                 double seconds);
@@ -62,13 +60,13 @@ std::string spheres_report_json(const SphereRobot& robot, const std::string& out
 /// contain the mesh as it was read (`read`).
 void complete_cover(SphereLink& link, bool read);
 
-/// Covers links again whose spheres overlap others' though the solids do not: with as many spheres
-/// as it takes to protrude only into the gaps that the solids leave there, of which the tightest
-/// are given up until 60 spheres a link on average are enough. Nothing is changed where at most a
-/// tenth of the free poses are called colliding, or where that would not become fewer.
+/// Covers links again whose spheres overlap others' although the solids do not, with as many
+/// spheres as needed to protrude only into the gaps between the solids. The tightest gaps are given
+/// up until 60 spheres a link on average are enough. Nothing changes if at most a tenth of the free
+/// poses are called colliding, or if that would not improve.
 ///
-/// `robot.self` is of its covers, and stays so. `fixed`: counts of links by name, which are kept.
-/// `is_open`: whether counts may change; if not, it is told alone what is in the way.
+/// `robot.self` belongs to its covers, and stays consistent. `fixed`: counts of links by name,
+/// which are kept. `is_open`: whether counts may change; if not, only the obstacles are reported.
 void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSolids& solids,
                    const SphereCoverSettings& cover,
                    const std::map<std::string, std::size_t>& fixed, bool is_open,

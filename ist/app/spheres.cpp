@@ -37,7 +37,7 @@ struct SpheresOptions {
   SettingOptions closing;
   bool json = false, quiet = false;
 
-  /// Whether the number of spheres was left open: then links get more where planners need them.
+  /// True if the number of spheres was left open: then links get more if planners need them.
   bool refined() const {
     return kind == Kind::cover && count == 0 && cover.total == 0 && cover.max_protrusion == 0;
   }
@@ -63,7 +63,7 @@ SphereRobot read_mesh_input(const SpheresOptions& options) {
   return out;
 }
 
-/// Says so where a link is so large beside the robot that its unit is probably another.
+/// Warns if a link is so large compared with the robot that its unit is probably different.
 void warn_of_size(const RobotModel& robot, const std::string& link, const TriangleMesh& mesh) {
   constexpr double kLarge = 10, kBeside = 50;
   Eigen::AlignedBox3d box;
@@ -78,7 +78,7 @@ void warn_of_size(const RobotModel& robot, const std::string& link, const Triang
       robot.file.path, link, box.diagonal().norm(), apart);
 }
 
-/// Joints that move in the file, but not here; those that carry a whole robot do not matter.
+/// Joints that move in the file, but not here, except those that carry the whole robot.
 std::vector<std::string> taken_as_fixed(const RobotModel& robot) {
   const RobotLink& root = robot.links[robot.order.front()];
   const bool is_bare = root.collision.empty() && root.visual.empty();
@@ -132,7 +132,7 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
       geometry();
       continue;
     }
-    // If asked to, encloses a mesh that cannot be closed.
+    // If requested, encloses a mesh that cannot be closed.
     const auto otherwise = [&](const std::string& why) -> std::optional<ClosedMesh> {
       if (!meshes.repairs({link.name})) return std::nullopt;
       spdlog::warn("{}; a bounding capsule stands for link {}", why, link.name);
@@ -171,8 +171,8 @@ std::vector<CoverSphere> baked_spheres(const ClosedMesh& mesh, std::size_t count
   return spheres;
 }
 
-/// Counts and total as they were asked for. By default a robot has some 8 spheres a link, as
-/// planners like them, shared by need, and a mesh 64.
+/// Counts and total as requested. By default a robot has some 8 spheres a link, as planners prefer,
+/// distributed by need, and a mesh 64.
 SphereCoverSettings cover_settings(const SphereRobot& input, const SpheresOptions& options) {
   constexpr std::size_t kOfALink = 8;
   SphereCoverSettings cover = options.cover;
@@ -216,7 +216,7 @@ std::vector<CoverSphere> spheres_around(const std::vector<CoverCapsule>& capsule
   return spheres;
 }
 
-/// `capsules`: of each mesh, if that is what is wanted.
+/// `capsules`: of each mesh, if requested.
 std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOptions& options,
                                       const ProgressCallback& progress,
                                       std::vector<std::vector<CoverCapsule>>& capsules) {
@@ -243,7 +243,7 @@ std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOpt
   return covers;
 }
 
-/// The joint of that name, which must be one whose position is free and allow this one.
+/// The joint of that name, which must be free and allow this position.
 std::size_t joint_at(const RobotModel& robot, const std::string& name, double position) {
   std::vector<std::string> names;
   for (std::size_t j = 0; j < robot.joints.size(); ++j) {

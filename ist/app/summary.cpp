@@ -20,8 +20,8 @@
 namespace ist::app {
 namespace {
 
-/// The remark on an asset: why it failed; else the confidence with which its mesh was closed, if it
-/// was open, the first warning and the number of others.
+/// The remark on an asset: the reason of its failure; else the confidence with which its open mesh
+/// was closed, the first warning and the number of others.
 std::string remark_on(const JobResult& result) {
   if (!result.message.empty()) return result.message;
   if (result.warnings.empty()) return "";
@@ -120,7 +120,7 @@ std::string image(const JobResult& result) {
     if (bytes.empty()) return "";
     return fmt::format("<img width={0} height={0} src=\"data:image/bmp;base64,{1}\">", kSide,
                        base64(bytes));
-  } catch (const Error&) {  // moved since
+  } catch (const Error&) {  // the file was moved since
     return "";
   }
 }
@@ -149,7 +149,7 @@ struct SummaryOptions {
   bool json = false, failed = false;
 };
 
-/// Sorts by a column at a click on its head, and hides rows without the text that is typed.
+/// Sorts by a column when its head is clicked, and hides rows without the typed text.
 constexpr const char* kScript = R"(<script>
 const body = document.querySelector('tbody'), rows = [...body.rows];
 document.querySelectorAll('th').forEach((head, i) => head.onclick = () => {
@@ -167,7 +167,6 @@ document.querySelector('input').oninput = event => rows.forEach(row => {
 });
 </script>)";
 
-/// Links to the other pages, for page `page`.
 std::string links_of_pages(const std::vector<std::string>& files, std::size_t page) {
   std::string out;
   for (std::size_t i = 0; i < files.size() && files.size() > 1; ++i) {
@@ -178,8 +177,8 @@ std::string links_of_pages(const std::vector<std::string>& files, std::size_t pa
   return out.empty() ? "" : "<p>pages: " + out + "\n";
 }
 
-/// A page of a library for a browser, all in one file: a table of some assets with a picture of
-/// each that keeps its mesh and can be read.
+/// A page of a library for a browser, in a single file: a table of assets with a picture of each
+/// that keeps a readable mesh.
 std::string summary_page(const Summary& summary, std::span<const JobResult* const> results,
                          const std::string& pages) {
   std::string out = fmt::format(
@@ -200,7 +199,7 @@ std::string summary_page(const Summary& summary, std::span<const JobResult* cons
   return out + "</tbody></table>" + kScript + "</html>\n";
 }
 
-/// A page for some hundred assets, failures first: FILE.html, FILE-2.html and so on.
+/// One page for some hundred assets, failures first: FILE.html, FILE-2.html and so on.
 void write_pages(const Summary& summary, const SummaryOptions& options) {
   constexpr std::size_t kOfAPage = 500;
   std::vector<const JobResult*> results;

@@ -48,8 +48,8 @@ AssetHeader describe_bake(const ClosedMesh& mesh, const MeshSolid& solid,
   return header;
 }
 
-/// Spheres of each level of detail, the finest first: a quarter of the one before, as long as
-/// there are enough to tell the solid's parts apart.
+/// Number of spheres of each level of detail, the finest first: a quarter of the level before, as
+/// long as that is enough to distinguish the solid's parts.
 std::vector<std::size_t> detail_counts(std::size_t spheres) {
   constexpr std::size_t kFewest = 250;
   std::vector<std::size_t> counts = {spheres};
@@ -61,8 +61,8 @@ std::vector<std::size_t> detail_counts(std::size_t spheres) {
 /// The steps of a bake. The first three run in turn on the backend, the others on the host.
 enum class Step { pack, calibrate, cover, order, bounds, finest_tree, inner_tree };
 
-/// Runs a table of stages on the host's threads. Each starts when all that it waits for is done:
-/// at once if the backend leaves these threads idle, else not before finish().
+/// Runs a table of stages on the host's threads. Each starts when its dependencies are done:
+/// immediately if the backend leaves these threads idle, else not before finish().
 class HostStages {
  public:
   struct Stage {
@@ -76,12 +76,12 @@ class HostStages {
     for (std::size_t i = 0; i < table_.size(); ++i)
       left_[i] = static_cast<int>(table_[i].waits_for.size());
   }
-  /// Waits on every exit from the scope: a task group that is not waited for would be cancelled,
-  /// and with it, silently, the loops inside its tasks.
+  /// Waits on every exit from the scope: destroying an unfinished task group would cancel it and,
+  /// silently, the loops inside its tasks.
   ~HostStages() {
     try {
       group_.wait();
-    } catch (...) {  // finish() reports; without it the scope is left by an exception already
+    } catch (...) {  // finish() reports; without it another exception is active
     }
   }
   HostStages(const HostStages&) = delete;
@@ -124,7 +124,7 @@ void describe_mass(const MeshMoments& moments, AssetHeader& header) {
   header.volume_error = moments.volume_error;
   for (int k = 0; k < 3; ++k) {
     header.centre_of_mass[k] = moments.centre[k];
-    header.inertia[k] = std::max(0.0, moments.inertia(k, k));  // of a needle about its own axis
+    header.inertia[k] = std::max(0.0, moments.inertia(k, k));  // for a needle about its own axis
     header.inertia[3 + k] = k < 2 ? moments.inertia(0, 1 + k) : moments.inertia(1, 2);
   }
   header.centre_of_mass_error = moments.centre_error;
@@ -140,13 +140,13 @@ void describe_bounds(const MeshSolid& solid, double beyond, AssetHeader& header)
     const double low = solid.bounds().min()[k], high = solid.bounds().max()[k];
     centre[k] = std::clamp(centre[k], low, high);
     header.ball_centre[k] = centre[k];
-    // Rounding, in this frame or in the unit frame, brings nothing back inside.
+    // Rounding, in this frame or in the unit frame, must not bring anything back inside.
     constexpr double kFar = std::numeric_limits<double>::infinity();
     const double further = (beyond + 1e-14) * frame.scale();
     header.box_lower[k] = beyond > 0 ? std::nextafter(low - further, -kFar) : low;
     header.box_upper[k] = beyond > 0 ? std::nextafter(high + further, kFar) : high;
   }
-  // About the centre as it is written, which far from the origin is not quite the smallest ball's.
+  // About the stored centre, which far from the origin is not exactly the smallest ball's.
   const Eigen::Vector3d from = frame.to_unit(centre);
   double radius = 0;
   for (const Ball& point : points)
@@ -159,8 +159,8 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedMe
                         const ProgressCallback& progress) {
   AssetArrays arrays;
   std::vector<std::uint32_t> inner_order;
-  // The finest matched spheres lie much as the inner ones do, whose order is found meanwhile. Trees
-  // of coarser levels follow their calibration.
+  // The finest matched spheres are close to the inner ones, whose order is computed meanwhile.
+  // Trees of coarser levels follow their calibration.
   HostStages host(
       backend.leaves_threads_idle(),
       {{Step::order, {Step::pack}, [&] { inner_order = sphere_order(arrays.inner_spheres); }},
@@ -172,8 +172,8 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedMe
           arrays.inner_tree =
               tree_from_order(arrays.inner_spheres, arrays.cover_radii, inner_order);
         }}});
-  // Idle host threads lay out the mesh and compute the moments from here on; elsewhere the packing
-  // asks for the moments first, and the mesh follows the covers.
+  // Idle host threads lay out the mesh and compute the moments from here on. Otherwise the packing
+  // needs the moments first, and the mesh follows the covers.
   if (backend.leaves_threads_idle()) {
     kept.start();
     host.add([&] { solid.unit_moments(); });
@@ -220,7 +220,7 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedMe
     levels->start();
     calibrate_levels(0, 1, backend, host, progress);
   } else {
-    // The finest first: while its tree grows, the largest, the others are calibrated.
+    // The finest first: its tree, the largest, is built while the others are calibrated.
     calibrate_levels(0, counts.size(), backend, host, progress);
   }
   arrays.cover_radii = cover_radii(solid, backend, packing.spheres, progress);

@@ -26,8 +26,8 @@ double random_at(std::uint64_t index) {
   return static_cast<double>(mixed((index + 1) * 0x9e3779b97f4a7c15u) >> 11) * 0x1p-53;
 }
 
-/// Throws Error, naming a place, if a signed distance is not finite or, between two of some
-/// thousand points in and around the bounds, changes by more than their distance.
+/// Throws Error, with a position, if a signed distance is not finite or if, between two of some
+/// thousand points in and around the bounds, it changes by more than their distance.
 void require_lipschitz(const Solid& solid) {
   const UnitFrame frame = unit_frame(solid.bounds());
   const Eigen::Vector3d half = solid.bounds().sizes() / 2;
@@ -69,8 +69,8 @@ void require_lipschitz(const Solid& solid) {
                 ". Divide it by its largest slope");
 }
 
-/// The solid by its signed distance, in the frame of the mesh and with its volume, so that one
-/// frame and one volume serve all stages.
+/// The solid by its signed distance, in the frame of the mesh and with the mesh's volume, so that
+/// all stages use one frame and one volume.
 class FramedSolid final : public Solid {
  public:
   FramedSolid(const Solid& solid, const MeshSolid& mesh) : solid_(solid), mesh_(mesh) {}
@@ -86,10 +86,10 @@ class FramedSolid final : public Solid {
   const MeshSolid& mesh_;
 };
 
-/// The seam for a solid known by its signed distance, with a mesh in its place, on the host: packed
-/// and covered by the signed distance, calibrated by the mesh. Both lie in the mesh's unit frame.
-/// `error` [u]: the two surfaces lie within it of each other, and it counts into protrusions.
-/// Solid and mesh must outlive the backend.
+/// The backend, on the host, for a solid with a signed distance and a mesh that approximates it:
+/// packed and covered by the signed distance, calibrated by the mesh. Both are in the mesh's unit
+/// frame. `error` [u]: the distance between the two surfaces is at most this; protrusions include
+/// it. Solid and mesh must outlive the backend.
 class PolygonisedBackend final : public SolidBackend {
  public:
   PolygonisedBackend(const Solid& solid, const MeshSolid& mesh, double error)
@@ -118,7 +118,7 @@ class PolygonisedBackend final : public SolidBackend {
   std::vector<double> cover_radii(const CoverTask& task,
                                   const std::function<void(int)>& report) override {
     CoverTask whole = task;
-    whole.half += error_;  // the solid may reach out of the mesh's box
+    whole.half += error_;  // the solid may extend beyond the mesh's box
     return cover_on_host(solid_, frame_, whole, report);
   }
 
@@ -137,7 +137,7 @@ class PolygonisedBackend final : public SolidBackend {
 constexpr double kCellOverRadius = 0.4;
 constexpr unsigned kFewestByDefault = 32, kMostByDefault = 256;
 
-/// Cells along the longest side that suit as many spheres.
+/// The number of cells along the longest side that suits so many spheres.
 unsigned cells_for(const Solid& solid, std::size_t spheres) {
   const double count = spheres == 0 ? 1e4 : static_cast<double>(spheres);
   const double radius = cube_root(3 * solid.volume() / (4 * std::numbers::pi * count));
@@ -158,7 +158,7 @@ Asset bake_field(const Solid& solid, const PackingSettings& settings,
   const ClosedMesh mesh = close_mesh(std::move(made.mesh), meshing.name);
   const MeshSolid mesh_solid(mesh);
   PolygonisedBackend backend(solid, mesh_solid, made.error);
-  Resolution as_made;  // the mesh is near the solid as it is
+  Resolution as_made;  // the mesh approximates the unchanged solid
   if (mesh.report.meets_itself) as_made.how = Resolution::How::unresolved;
   SharedMesh kept(mesh_solid, as_made, settings.keep_mesh, settings.threads);
   AssetArrays arrays = bake_arrays(mesh, mesh_solid, kept, backend, settings, progress);

@@ -10,27 +10,27 @@
 
 namespace ist {
 
-/// bake() of a mesh whose solid, kept mesh and backend are at hand, on the threads of the current
-/// arena. The settings have been checked; where they run is the backend's affair.
+/// bake() of a mesh with its solid, kept mesh and backend, on the threads of the current arena. The
+/// settings have been validated; the backend determines where they run.
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SharedMesh& kept,
                  SolidBackend& backend, const PackingSettings& settings,
                  const ProgressCallback& progress);
 
-/// The same with mesh and backend as the settings ask for.
+/// The same with the mesh and backend that the settings request.
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, const Resolution& resolution,
                  const PackingSettings& settings, const ProgressCallback& progress);
 
-/// Frame, hash and mass of the mesh: all of a header that needs no spheres.
+/// Frame, hash and mass of the mesh: the part of a header that needs no spheres.
 AssetHeader describe_solid(const ClosedMesh& mesh, const MeshSolid& solid);
 
 void describe_mass(const MeshMoments& moments, AssetHeader& header);
 
-/// Box and ball around the mesh, each `beyond` further out, unit frame.
+/// Box and ball around the mesh, each enlarged by `beyond`, unit frame.
 void describe_bounds(const MeshSolid& solid, double beyond, AssetHeader& header);
 
 void keep(const KeptMesh& kept, AssetArrays& arrays);
 
-/// Everything of that asset but its bytes.
+/// The contents of that asset before serialisation.
 AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedMesh& kept,
                         SolidBackend& backend, const PackingSettings& settings,
                         const ProgressCallback& progress);

@@ -18,10 +18,10 @@
 namespace ist {
 namespace {
 
-constexpr std::uint32_t kNearPoses = 40;      // at the overlap that was asked about, for the search
-constexpr std::uint32_t kPartnerPoses = 24;   // likewise, of each partner but the copy
-constexpr std::uint32_t kFewTrials = 8;       // fewer say nothing of a partner
-constexpr std::uint32_t kPosesPerClass = 30;  // besides, for the prediction
+constexpr std::uint32_t kNearPoses = 40;      // at the requested overlap, for the search
+constexpr std::uint32_t kPartnerPoses = 24;   // likewise, for each partner except the copy
+constexpr std::uint32_t kFewTrials = 8;       // fewer are not significant
+constexpr std::uint32_t kPosesPerClass = 30;  // more poses, for the prediction
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -30,20 +30,20 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The caller's word and the clock, for all stages of a search together.
+/// Progress, cancellation and the time limit of all stages of a search together.
 class Watch {
  public:
   Watch(const ProgressCallback& progress, double time_limit)
       : progress_(progress), time_limit_(time_limit) {}
 
-  /// For a stage that only the caller may stop.
+  /// The callback of a stage that only the caller may stop.
   ProgressCallback patient() {
     return [this](const Progress& now) {
       if (progress_ && !progress_(now)) cancelled_ = true;
       return !cancelled_;
     };
   }
-  /// For one that ends with the time as well.
+  /// The callback of a stage that the time limit may stop as well.
   ProgressCallback strict() {
     return [this](const Progress& now) { return patient()(now) && !late(); };
   }
@@ -55,7 +55,7 @@ class Watch {
     if (time_limit_ > 0 && elapsed() >= time_limit_) late_ = true;
     return late_;
   }
-  bool is_late() const { return late_; }  ///< some stage was ended by it
+  bool is_late() const { return late_; }  ///< the time limit ended some stage
   void throw_if_cancelled() const {
     if (cancelled_) throw Error("bake to an error: cancelled");
   }
@@ -79,8 +79,8 @@ struct Candidate {
   Asset asset;
   std::vector<double> errors = {};        ///< relative, of the volumes at the first poses of copies
   std::vector<double> other_errors = {};  ///< likewise at the first trials of other partners
-  std::array<PartnerError, kTrialPartners> partners = {};  ///< near the overlap asked about
-  PartnerError worst = {};                                 ///< among them
+  std::array<PartnerError, kTrialPartners> partners = {};  ///< near the requested overlap
+  PartnerError worst = {};                                 ///< of `partners`
   std::uint32_t poses = 0;                                 ///< of all of them
 
   double error() const { return worst.median; }
@@ -120,7 +120,7 @@ class TargetBake {
     return candidate.poses > 0 && candidate.error() <= target_.relative_error;
   }
 
-  /// Reports; false: the time is over.
+  /// Reports; false: the time limit is reached.
   bool go_on(Stage& stage, double part) {
     stage.stop([&](Progress& now) {
       now.spheres = best_ ? best_->spheres() : 0;
@@ -130,7 +130,8 @@ class TargetBake {
     return !watch_.is_late();
   }
 
-  /// None: the time is over. The first one has to come to its end, for want of another.
+  /// Nothing: the time limit is reached. The first bake always completes, as there is no other
+  /// result.
   std::optional<Asset> baked(std::size_t spheres) {
     PackingSettings of_size = settings_;
     of_size.max_spheres = spheres;
@@ -145,7 +146,7 @@ class TargetBake {
     }
   }
 
-  /// The solid's own triangles, by which volumes are exact.
+  /// The asset of the solid's own triangles, which gives exact volumes.
   AssetView own_mesh() {
     const AssetView baked = best_->asset.view();
     if (baked.mesh_state() == MeshState::unresolved)
@@ -158,7 +159,7 @@ class TargetBake {
     return own_mesh_->view();
   }
 
-  /// A first asset, and poses at the overlap asked about.
+  /// Makes a first asset, and poses at the requested overlap.
   void find_near_poses() {
     std::optional<Asset> asset = baked(CountSearch::first(most_));
     if (!asset) return;
@@ -184,7 +185,7 @@ class TargetBake {
     }
   }
 
-  /// Poses of all classes, other ones than the search has seen; false: the time is over.
+  /// Adds poses of all classes that the search has not used; false: the time limit is reached.
   bool add_other_poses() {
     const TrialBody body = {solid_, own_mesh()};
     Stage stage("predict", watch_.strict());
@@ -197,7 +198,8 @@ class TargetBake {
     return true;
   }
 
-  /// Asks a candidate about what it has not been asked about; false: the time is over.
+  /// Evaluates a candidate at the poses where it has not been evaluated; false: the time limit is
+  /// reached.
   bool judge(Candidate& candidate) {
     Stage stage("predict", watch_.strict());
     const AssetView& tree = candidate.asset.view();
@@ -224,7 +226,7 @@ class TargetBake {
     return true;
   }
 
-  /// Medians of each partner near the overlap asked about, and the worst of them.
+  /// Medians of each partner near the requested overlap, and the worst of them.
   void sum_up(Candidate& candidate) const {
     candidate.poses = 0;
     candidate.worst = {};
@@ -258,7 +260,7 @@ class TargetBake {
     std::size_t spheres = best_->spheres();
     StopReason stop = best_->packing_stop();
     for (;;) {
-      // After a limit other than the count no more spheres fit.
+      // If a limit other than the count was reached, more spheres do not fit.
       if (stop != StopReason::sphere_count && error > target_.relative_error) return;
       const std::optional<std::size_t> next = counts.next(spheres, error);
       std::optional<Asset> asset = next ? baked(*next) : std::nullopt;
@@ -311,10 +313,10 @@ class TargetBake {
   SharedMesh kept_;
   const std::unique_ptr<SolidBackend> backend_;
   std::vector<TrialPose> poses_;                 ///< near ones, then those of all classes
-  std::optional<std::size_t> first_of_classes_;  ///< among them, once they are there
+  std::optional<std::size_t> first_of_classes_;  ///< in `poses_`, once they are added
   std::vector<OtherTrial> others_;
   std::optional<Candidate> best_;
-  std::optional<Asset> own_mesh_;  ///< if the candidates' best is another or none
+  std::optional<Asset> own_mesh_;  ///< if the best candidate has another mesh or none
   Workspace workspace_;
 };
 

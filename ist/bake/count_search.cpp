@@ -7,18 +7,18 @@ namespace ist {
 namespace {
 
 constexpr std::size_t kFirst = 250;
-constexpr std::size_t kFewest = 16;  // no fewer are looked for
+constexpr std::size_t kFewest = 16;  // the fewest spheres that are tried
 constexpr std::size_t kMostTrials = 8;
-// Fractions of the requested error. A median over some tens of poses is itself off by a tenth or
-// two, hence the margin; an error below kWasteful takes more spheres than needed.
+// Fractions of the requested error. A median over some tens of poses has an error of 10 to 20 %
+// itself, hence the margin; an error below kWasteful takes more spheres than needed.
 constexpr double kAim = 0.8, kWasteful = 0.6;
 constexpr double kCloseEnough = 1.25;  // between a count that fails and one that does
 constexpr double kApart = 1.1;         // from counts whose error is known
-constexpr double kMostGrowth = 8;      // at once: an overshoot costs more than one bake more
-constexpr int kFewestEighths = 5, kMostEighths = 13;  // of the power that is believed
-constexpr double kLeast = 1e-12;                      // of an error to divide by
+constexpr double kMostGrowth = 8;      // per step: an overshoot costs more than one more bake
+constexpr int kFewestEighths = 5, kMostEighths = 13;  // limits of the measured power
+constexpr double kLeast = 1e-12;                      // divisors are at least this
 
-/// x^(eighths / 8) by multiplications and square roots, so that it is the same everywhere.
+/// x^(eighths / 8) by multiplications and square roots, so that it is the same on every platform.
 double power(double x, int eighths) {
   const double root = std::sqrt(std::sqrt(std::sqrt(x)));
   double result = 1;
@@ -30,8 +30,8 @@ double power(double x, int eighths) {
 
 std::size_t CountSearch::first(std::size_t most) { return std::min(kFirst, most); }
 
-/// The count at which the error that is aimed at is expected, by the last two trials: the growth
-/// of the count is a power of the fall of the error.
+/// The count at which the target error is expected, from the last two trials: the growth of the
+/// count is a power of the reduction of the error.
 double CountSearch::guess() const {
   const Trial& last = trials_.back();
   int eighths = 8;

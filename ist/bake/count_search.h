@@ -6,10 +6,10 @@
 
 namespace ist {
 
-constexpr std::size_t kMostCounted = 200'000;  ///< spheres, where the caller sets no limit
+constexpr std::size_t kMostCounted = 200'000;  ///< spheres, if the caller sets no limit
 
-/// Looks for about the fewest spheres whose error does, in few bakes: each answer is the next count
-/// to try. The error falls about as 1 / count.
+/// Searches for about the fewest spheres with a sufficient error, in few bakes: each result is the
+/// next count to try. The error falls about as 1 / count.
 class CountSearch {
  public:
   /// Counts in [1, most]; error > 0.
@@ -17,7 +17,7 @@ class CountSearch {
 
   static std::size_t first(std::size_t most);
 
-  /// Takes the error of a bake of `count` spheres. Returns the next count, or nothing at the end.
+  /// Records the error of a bake of `count` spheres. Returns the next count, or nothing at the end.
   std::optional<std::size_t> next(std::size_t count, double error);
 
  private:
@@ -30,9 +30,9 @@ class CountSearch {
 
   double error_;
   std::size_t most_;
-  std::vector<Trial> trials_;   ///< in the order they came
-  std::optional<Trial> fails_;  ///< of most spheres
-  std::optional<Trial> does_;   ///< of fewest
+  std::vector<Trial> trials_;   ///< in order
+  std::optional<Trial> fails_;  ///< with the most spheres
+  std::optional<Trial> does_;   ///< with the fewest
 };
 
 }  // namespace ist

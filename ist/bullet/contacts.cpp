@@ -27,7 +27,7 @@ btRigidBody* movable(const btCollisionObject& object) {
   return body != nullptr && body->getInvMass() > 0 ? body : nullptr;
 }
 
-/// The place of an object a time ago, by its velocity.
+/// The place of an object some time ago, by its velocity.
 btTransform moved_back(const btCollisionObject& object, btScalar time) {
   btTransform before = object.getWorldTransform();
   const btRigidBody* const body = movable(object);
@@ -48,7 +48,7 @@ double fast_motion(const btCollisionObject& first, const btCollisionObject& seco
   return least;
 }
 
-/// A shape, or what a compound is made of: `visit(shape, in_body)`.
+/// Calls `visit(shape, in_body)` for a shape, or for the parts of a compound.
 template <class Visit>
 void for_each_part(const btCollisionShape& shape, const btTransform& in_body, const Visit& visit) {
   if (!shape.isCompound()) return visit(shape, in_body);
@@ -71,9 +71,9 @@ Unsaid unsaid_motion(const btCollisionObject& object, const btTransform& before,
   return motion;
 }
 
-/// [u] The motion that points follow.
+/// [u] The motion during which points are moved along instead of queried again.
 double motion_until_asked(const Contact& contact, const Settings& settings, const Spring& spring) {
-  // Corners of fixed areas bear three times the torque of a face that tilts on its springs.
+  // Corners with fixed areas bear three times the torque of a face that tilts on its springs.
   constexpr double kFlat = 0.1;
   if (contact.flat) return kFlat * settings.follow * spring.rest;
   return std::min(settings.follow * std::max(spring.rest, mean_depth(contact)), spring.rest);
@@ -85,13 +85,13 @@ struct PairAlgorithm::State {
   State(const btCollisionShape& first, const btCollisionShape& second, const Contacts& world)
       : meeting(first, second, &world) {}
 
-  // A step of a pair that stays apart reads these alone, which share few cache lines.
-  btTransform second_in_first;  // when last asked
+  // A step of a pair that stays apart reads only these, which share few cache lines.
+  btTransform second_in_first;  // at the last query
   double still = -1;            // [u] the answer is valid until a point has moved by more than this
   bool apart = true;            // it has no points
   bool has_before = false;
   Meeting meeting;
-  Places before;  // where the shapes were in the last step, if `has_before`
+  Places before;  // the shapes' places in the last step, if `has_before`
   Points points;
   ContactMemory memory;
   ContactForce pushed;
@@ -108,7 +108,7 @@ void Contacts::register_with(btCollisionDispatcher& dispatcher) {
   create_.contacts = this;
   create_.others = dispatcher.getCollisionConfiguration();
   for (int other = 0; other < MAX_BROADPHASE_COLLISION_TYPES; ++other) {
-    // Bullet takes compounds apart and asks for their children.
+    // Bullet decomposes compounds and queries their children.
     if (other == COMPOUND_SHAPE_PROXYTYPE || other == EMPTY_SHAPE_PROXYTYPE) continue;
     for (const auto& [a, b] : {std::pair<int, int>{CUSTOM_CONCAVE_SHAPE_TYPE, other},
                                std::pair<int, int>{other, CUSTOM_CONCAVE_SHAPE_TYPE}}) {
@@ -123,7 +123,7 @@ void Contacts::configure(btDynamicsWorld& world) {
   btContactSolverInfo& solver = world.getSolverInfo();
   solver.m_splitImpulse = false;    // the patches' springs push by speed
   solver.m_numIterations = 50;      // a stack is a chain of contacts
-  solver.m_warmstartingFactor = 1;  // else friction begins too weak in every step
+  solver.m_warmstartingFactor = 1;  // else friction is too weak at the beginning of every step
   solver.m_solverMode |=
       SOLVER_USE_2_FRICTION_DIRECTIONS | SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
 }
@@ -229,14 +229,14 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
       state_->still > 0 &&
       state_->meeting.largest_motion(state_->second_in_first, second_in_first) <= state_->still;
   const bool placed = first.isKinematicObject() || second.isKinematicObject();
-  // Most pairs of a heap are apart and stay so.
+  // Most pairs of a heap are apart and stay apart.
   if (holds && state_->apart && !placed && typeid(*result) == typeid(btManifoldResult)) {
     state_->has_before = false;
     return;
   }
   const Settings settings = contacts_.settings_of(first, second);
   if (typeid(*result) != typeid(btManifoldResult)) {
-    // contactTest() and its like collect points through a manifold.
+    // contactTest() and similar functions collect points through a manifold.
     Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact);
     result->setPersistentManifold(state_->points.first_manifold(first, second, *m_dispatcher));
@@ -317,7 +317,7 @@ void PairAlgorithm::push(const btCollisionObject& first, const btCollisionObject
     state_->memory = {};
     return;
   }
-  if (whole) contact.patches[0] = whole_patch(contact.whole);  // of one name in every pose
+  if (whole) contact.patches[0] = whole_patch(contact.whole);  // with the same name in every pose
 
   btRigidBody* const b = movable(second);
   btRigidBody* const a = movable(first);

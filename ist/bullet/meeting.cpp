@@ -39,7 +39,7 @@ Body body_of(const btCollisionObject& object) {
   return {};
 }
 
-/// How far apart flat faces of meshes may be and push, of the smaller solid's size.
+/// The distance up to which flat faces of meshes push, relative to the smaller solid's size.
 constexpr double kReach = 0.02;
 
 /// For two assets whose meshes do not overlap: a push where they touch or are nearest, for
@@ -53,7 +53,7 @@ std::optional<Penetration> push_across(const Penetration& apart, const Separatio
     normal = gap.normal;
   }
   if (!(normal.squaredNorm() > 0)) return std::nullopt;
-  constexpr double kHardly = 1e-6;  // its size is no matter
+  constexpr double kHardly = 1e-6;  // the magnitude does not matter
   const Eigen::Vector3d force = kHardly * (reach * reach) * normal;
   push.volume = 0;
   push.force = force;
@@ -65,7 +65,7 @@ std::optional<Penetration> push_across(const Penetration& apart, const Separatio
 
 Meeting::Meeting(const btCollisionShape& first, const btCollisionShape& second,
                  const Contacts* world)
-    // SDF shapes of Bullet's have the same type.
+    // Bullet's own SDF shapes have the same type.
     : first_(dynamic_cast<const Shape*>(&first)),
       second_(dynamic_cast<const Shape*>(&second)),
       world_(world),
@@ -108,7 +108,8 @@ double Meeting::stiffness() const {
 }
 
 double Meeting::largest_motion(const btTransform& before, const btTransform& now) const {
-  // A turn by θ moves what is R away by 2 R sin(θ/2), and two bases differ by √8 sin(θ/2).
+  // A rotation by θ moves a point at distance R by 2 R sin(θ/2), and two bases differ by √8
+  // sin(θ/2).
   const auto motion = [reach = (second_ ? second_ : first_)->reach()](const btTransform& from,
                                                                       const btTransform& to) {
     double turned = 0;
@@ -137,7 +138,7 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   const auto blur = [](const Shape* shape) {
     return shape != nullptr ? shape->scale() * shape->tree().protrusion() : 0;
   };
-  // How far apart flat faces may be and push: as spheres do that stick out, and meshes shall.
+  // The distance up to which flat faces push: the protrusion of spheres, and the same for meshes.
   const double reach = exact ? kReach * std::cbrt(volume()) : blur(first_) + blur(second_);
   Separation gap;
   const auto find_gap = [&] {
@@ -177,13 +178,13 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
       if (!apart) find_gap();
       contact.clearance = gap.distance_min - reach;
       if (contact.clearance > 0 || !(gap.distance > 0)) return;
-      // Faces that do not look at each other now may do so halfway.
+      // Faces that do not face each other now may do so halfway.
       contact.clearance = gap.distance_min / 2;
     }
     whole = push_across(contact.whole, gap, reach, contact.origin);
     if (!whole) return;
   } else {
-    // Patches of a flat contact push alike.
+    // Patches of a flat contact push in similar directions.
     constexpr double kAlike = 0.99;
     double areas = 0;
     for (const ContactPatch& patch : room.first(contact.count)) areas += patch.area;
@@ -197,7 +198,7 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   SupportPolygon polygon(*whole, contact.origin, to_eigen(by_second ? second : first).linear(),
                          2 * std::min(radius(first_), radius(second_)),
                          exact && !waits ? 0 : reach);
-  // First the side with fewer triangles: in most contacts nothing of it is flat.
+  // The side with fewer triangles first: in most contacts it is not flat.
   const auto triangles = [](const Shape* shape) {
     return shape != nullptr ? shape->tree().mesh_triangles() : 0;
   };
@@ -216,8 +217,8 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
 }
 
 bool Meeting::find_way_out(const Solids& solids, const Places& at, Contact& contact) const {
-  // Inside the other a solid's overlap is all of it and changes with no motion. Patches may be left
-  // that push against each other.
+  // If a solid is inside the other, its overlap is all of it and no motion changes it. The
+  // remaining patches may push against each other.
   constexpr double kWhole = 0.99, kNone = 0.01;
   const double overlap = contact.whole.volume;
   if (!(contact.whole.force.norm() < kNone * std::pow(overlap, 2.0 / 3))) return false;
@@ -244,7 +245,7 @@ bool Meeting::find_way_out(const Solids& solids, const Places& at, Contact& cont
     exit_patch.id = ~std::uint64_t{0};
     exit_patch.normal = inner == 1 ? near.gradient : Eigen::Vector3d(-near.gradient);
     exit_patch.depth = radius - near.distance;
-    if (near.status != QueryStatus::ok) {  // it keeps no mesh
+    if (near.status != QueryStatus::ok) {  // it has no mesh
       const Eigen::Vector3d between = to_eigen(at[1].getOrigin() - at[0].getOrigin());
       exit_patch.normal =
           between.norm() > 0 ? Eigen::Vector3d(between.normalized()) : Eigen::Vector3d::UnitZ();
@@ -269,7 +270,7 @@ TimeOfImpact Meeting::impact(const Places& from, const Places& to, const Places&
     return motion_between(to_pose(from[i] * solid), to_pose(to[i] * solid), 1,
                           to_eigen(solid.inverse().getOrigin()) / scale, scale);
   };
-  // A flat face above a mesh takes any number; what is left is stopped early.
+  // A flat face above a mesh may need any number of visits; the excess is stopped early.
   const ImpactSettings limit{.max_visits = partner_ ? 1u << 13 : 0u};
   return time_of_impact(a, b, {motion(first_, 0), motion(second_, 1)}, limit, workspace());
 }
@@ -290,7 +291,8 @@ double Meeting::share_until_impact(const Places& from, const Places& to, const P
   const double stride = threshold / motion;
   if (found.kind != ImpactKind::overlapping) return std::min(1.0, found.time + kDepth * stride);
 
-  // In contact. Their mean depth tells most where they slide or turn, as a nut on its thread.
+  // In contact, their mean depth is most informative if they slide or turn, like a nut on its
+  // thread.
   const auto depth_after = [&](double share) {
     Places at;
     for (std::size_t i = 0; i < 2; ++i) {
@@ -304,11 +306,11 @@ double Meeting::share_until_impact(const Places& from, const Places& to, const P
     find(shapes[0], shapes[1], settings, contact);
     return mean_depth(contact);
   };
-  // Two that are deeper already are their springs' task: where nothing may go deeper, a heap of
-  // bodies stands still and keeps its speeds.
+  // Bodies that are already deeper are left to their springs: if nothing could get deeper, a heap
+  // of bodies would stand still and keep its speeds.
   const double deep = kDepth * threshold, begins = depth_after(0);
   const double most = begins < deep ? deep : begins + deep;
-  const double least = stride / 8;  // or two bodies that turn into each other would stop for good
+  const double least = stride / 8;  // else two bodies that turn into each other would stop forever
   double share = 0, next = stride;
   for (int looks = 0; looks < kLooks && share < 1 && next >= least; ++looks) {
     const double there = std::min(1.0, share + next);
@@ -356,7 +358,7 @@ Spring spring_of(const Meeting& meeting, const btCollisionObject& first,
   spring.rest = lighter.gravity > 0 ? lighter.gravity / held : sag;
   spring.slow = std::sqrt(2 * held) * spring.rest;
   spring.relaxation = 2 * settings.damping / std::sqrt(held);
-  // A stiff spring parts bodies no more slowly.
+  // A stiff spring must separate bodies no more slowly.
   const double fall = std::sqrt(2 * pull * std::max(spring.rest, sag));
   spring.push_out = settings.push_out > 0 ? settings.push_out : 3 * fall;
   spring.least = std::min(fall, spring.push_out);

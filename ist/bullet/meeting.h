@@ -13,41 +13,40 @@ using Places = std::array<btTransform, 2>;
 
 inline Places operator*(const Places& a, const Places& b) { return {a[0] * b[0], a[1] * b[1]}; }
 
-/// Two shapes of which one is a Shape, prepared for many queries. Both must outlive it.
+/// Two shapes, at least one of which is a Shape, prepared for many queries. Both must outlive it.
 class Meeting {
  public:
   /// `world`: where to warn.
   Meeting(const btCollisionShape& first, const btCollisionShape& second,
           const Contacts* world = nullptr);
 
-  /// One of them is a Shape.
+  /// True if one of them is a Shape.
   bool has_shape() const { return first_ != nullptr || second_ != nullptr; }
   bool is_met() const { return (first_ != nullptr && second_ != nullptr) || partner_.has_value(); }
 
-  /// The shapes' transforms are given. The contact pushes the second. `likely_apart`: looks first
-  /// whether the shapes are; it changes no contact.
+  /// Finds the contact at the given transforms; it pushes the second. `likely_apart`: tests first
+  /// whether the shapes are apart, which does not change the contact.
   void find(const btTransform& first, const btTransform& second, const Settings& settings,
             Contact& contact, bool likely_apart = false) const;
 
-  /// The share [0, 1] of a motion of two bodies at which their shapes collide, or get too deep in a
-  /// contact: see Contacts::updateAction(). `in_body`: the shapes, as children of these. 1 if no
-  /// point moves by more than `threshold` [u] against the other body.
+  /// The fraction [0, 1] of a motion of two bodies at which their shapes collide, or get too deep
+  /// in a contact: see Contacts::updateAction(). `in_body`: the shapes, as children of these. 1 if
+  /// no point moves by more than `threshold` [u] relative to the other body.
   double share_until_impact(const Places& from, const Places& to, const Places& in_body,
                             double threshold, const Settings& settings) const;
 
-  /// [u] No point of one has moved by more than this against the other since the second was at
+  /// [u] Bound on the motion of any point of one relative to the other since the second was at
   /// `before` in the frame of the first.
   double largest_motion(const btTransform& before, const btTransform& now) const;
 
   double volume() const;     ///< [u³] of the smaller asset
-  double stiffness() const;  ///< [force/u³] of the shapes' materials; 0: none has any
+  double stiffness() const;  ///< [force/u³] of the shapes' materials; 0: neither has one
 
  private:
   using Solids = std::array<PlacedSolid, 2>;
   double thickness_of(const Settings& settings) const;  ///< [u] Settings::thickness, or its default
-  /// For overlapping solids: whether one is wholly inside the other, and then the shortest way out.
+  /// For overlapping solids: true if one is wholly inside the other, with the shortest exit.
   bool find_way_out(const Solids& solids, const Places& at, Contact& contact) const;
-  /// At the beginning of a motion.
   Solids placed(const Places& from, const Places& to, const Settings& settings) const;
   /// The first impact of a motion of both bodies in a time of 1.
   TimeOfImpact impact(const Places& from, const Places& to, const Places& in_body,
@@ -56,15 +55,15 @@ class Meeting {
   const Shape* first_ = nullptr;  // null: partner_
   const Shape* second_ = nullptr;
   const Contacts* world_;
-  std::uint32_t pair_id_;  // no two at a time have the same
+  std::uint32_t pair_id_;  // unique among current pairs
   std::optional<Partner> partner_;
 };
 
 /// [u] Volume over area; 0 without an overlap.
 double mean_depth(const Contact& contact);
 
-/// The motion of an object that is placed anew in every step and given no speed: Bullet's solver
-/// does not see it.
+/// The motion of an object that is placed anew in every step without a speed: Bullet's solver does
+/// not know it.
 struct Unsaid {
   btVector3 velocity{0, 0, 0}, turning{0, 0, 0}, origin{0, 0, 0};
   btVector3 at(const btVector3& point) const { return velocity + turning.cross(point - origin); }
@@ -75,17 +74,17 @@ struct Spring {
   double stiffness = 0;   ///< [force/u³] pressure over depth
   double relaxation = 0;  ///< [s] damper over spring
   double rest = 0;        ///< [u] depth at which the lighter body rests
-  double slow = 0;        ///< [u/s] a body that fell by `rest` is this fast
-  double linear = 0;      ///< [u] deeper, the pressure grows with the depth's square
-  double push_out = 1;    ///< [u/s] it drives bodies apart no faster
-  double least = 1;       ///< [u/s] at least, where other points push against it
-  double rebound = 0;     ///< of a closing speed that it may give back
+  double slow = 0;        ///< [u/s] speed of a body that fell by `rest`
+  double linear = 0;      ///< [u] beyond it the pressure grows with the square of the depth
+  double push_out = 1;    ///< [u/s] maximum separating speed
+  double least = 1;       ///< [u/s] minimum, if other points push against it
+  double rebound = 0;     ///< of a closing speed that it may return
   double step = 0;        ///< [s] the world's
 
   /// [force/u³] at that depth.
   double at(double depth) const { return stiffness * std::max(1.0, depth / linear); }
-  /// [u/s] At which an implicit step parts bodies at rest that are so deep: the spring's speed, but
-  /// no more than `most`.
+  /// [u/s] The speed at which an implicit step separates bodies at rest at that depth: the spring's
+  /// speed, but no more than `most`.
   double parting(double depth, double most) const {
     return std::min(depth / (step + relaxation), std::max(most, least));
   }

@@ -39,7 +39,8 @@ Vector on_segment(const Vector& x, const Vector& a, const Vector& b) {
   return a + std::clamp((x - a).dot(along) / along.squaredNorm(), 0.0, 1.0) * along;
 }
 
-/// A cone about the z axis, its base below: in the half-plane of distance from the axis and height.
+/// A cone about the z axis, with its base below, in the half-plane of distance from the axis and
+/// height.
 ShapeSample cone_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   const auto& cone = *static_cast<const btConeShape*>(context);
   const double radius = cone.getRadius(), height = cone.getHeight();
@@ -77,7 +78,8 @@ ShapeSample hull_sample(const void* context, const Eigen::Vector3d& x) noexcept 
 
 std::vector<btVector3> corners_of(const btPolyhedralConvexShape& shape) {
   if (shape.getShapeType() == CONVEX_TRIANGLEMESH_SHAPE_PROXYTYPE) {
-    // It counts no corners. Triangles come scaled by the mesh, as its support does.
+    // The callback does not count corners. Triangles are already scaled by the mesh, like its
+    // support.
     struct Corners : btInternalTriangleIndexCallback {
       std::vector<btVector3> all;
       void internalProcessTriangleIndex(btVector3* corners, int, int) override {
@@ -95,7 +97,7 @@ std::vector<btVector3> corners_of(const btPolyhedralConvexShape& shape) {
   return corners;
 }
 
-/// Bullet tells nobody what its terrain is made of: an heir may look.
+/// Bullet does not expose the data of its terrain, except to derived classes.
 struct Terrain : btHeightfieldTerrainShape {
   static bool find(const btHeightfieldTerrainShape& shape, PlacedShape& placed, btVector3& origin) {
     if (shape.*(&Terrain::m_upAxis) != 2 || shape.*(&Terrain::m_heightDataType) != PHY_FLOAT) {
@@ -111,7 +113,7 @@ struct Terrain : btHeightfieldTerrainShape {
     field.highest = shape.*(&Terrain::m_maxHeight);
     placed.shape = field;
     placed.scale = scaling.z();
-    // Bullet's is centred, ist's begins at the first height's foot.
+    // Bullet's terrain is centred, ours begins below the first height.
     origin = -scaling * (shape.*(&Terrain::m_localOrigin));
     return true;
   }
@@ -292,8 +294,9 @@ Eigen::Vector3d MeshDistance::Triangle::nearest(const Eigen::Vector3d& x) const 
 }
 
 ShapeSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
-  // Where several triangles are as near, as at a common side, all of them tell front from back: by
-  // the angles at which they meet there. Sides that two of them share cancel; a border is left.
+  // If several triangles are equally near, as at a common side, all of them decide between front
+  // and back, by the angles at which they meet there. Sides that two of them share cancel; a border
+  // remains.
   constexpr double kAsNear = 1 + 1e-9, kNone = 1e-6;
   if (boxes_.empty()) return {1e100, Eigen::Vector3d::Zero()};
   if (level_) {
@@ -302,7 +305,7 @@ ShapeSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
     if (depth < thickness_ - depth) return {-depth, up};
     return {depth - thickness_, -up};
   }
-  // The triangles of the nearest box say first how near is near.
+  // The triangles of the nearest box give a first bound.
   const auto foot_on = [&](const Triangle& triangle, const Eigen::Vector3d& share) {
     const auto& corner = triangle.corner;
     return Eigen::Vector3d(share[0] * corner[0] + share[1] * corner[1] + share[2] * corner[2]);

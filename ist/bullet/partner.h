@@ -15,10 +15,10 @@
 
 namespace ist::bullet {
 
-/// Points of a convex hull by its faces: exact inside and outside.
+/// Points relative to a convex hull by its faces: exact inside and outside.
 class HullDistance {
  public:
-  /// Fewer than four faces: it is flat, and no solid.
+  /// With fewer than four faces it is flat, not a solid.
   explicit HullDistance(const std::vector<btVector3>& points);
 
   std::size_t faces() const { return faces_.size(); }
@@ -34,8 +34,8 @@ class HullDistance {
   std::vector<Face> faces_;
 };
 
-/// A triangle mesh near a body, as a solid: what lies behind the front of its nearest triangle, to
-/// a depth. The front is where a triangle's corners run anticlockwise.
+/// A triangle mesh near a body, as a solid: everything behind the front of its nearest triangle, to
+/// a depth. The front is the side from which corners run anticlockwise.
 class MeshDistance : public btTriangleCallback {
  public:
   /// Takes the triangles of the shape that reach into the box, in the shape's frame, grown by
@@ -54,20 +54,21 @@ class MeshDistance : public btTriangleCallback {
     double area, reach = 0;  // [u²] twice its own; [u] of a corner from the centre
   };
   void processTriangle(btVector3* corners, int part, int index) override;
-  /// Whether all triangles lie in one plane, in which they cover what is under a box.
+  /// True if all triangles lie in one plane and cover the area under a box.
   bool is_level(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) const;
 
-  static constexpr std::size_t kBlock = 8;  // neighbours, as the shape's tree has them
+  static constexpr std::size_t kBlock =
+      8;  // consecutive triangles, in the order of the shape's tree
   std::vector<Triangle> triangles_;
   std::vector<Eigen::AlignedBox3d> boxes_;  // of blocks
   double thickness_ = 0;
-  int up_ = -1;  // of a height field: the axis to which its front faces
+  int up_ = -1;  // of a height field: the axis that its front faces
   bool mirrored_ = false;
-  bool level_ = false;  // near the body: the first triangle's plane
+  bool level_ = false;  // near the body, in the first triangle's plane
 };
 
-/// A collision partner that is no asset: a shape of Bullet's as a shape in its own frame. Bullet's
-/// shape must outlive it and must not change meanwhile.
+/// A collision partner that is not an asset: a shape of Bullet's as a shape in its own frame.
+/// Bullet's shape must outlive it and must not change meanwhile.
 class Partner {
  public:
   static std::optional<Partner> of(const btCollisionShape& shape);
@@ -82,8 +83,8 @@ class Partner {
     return mesh_ != nullptr ? thickness : std::numeric_limits<double>::infinity();
   }
 
-  /// Its flat faces, where SupportPolygon::add() does not know them. `placed`: by placed(), in the
-  /// same thread and not before another.
+  /// Adds its flat faces, if SupportPolygon::add() does not know them. `placed`: from placed(), in
+  /// the same thread and before its next call.
   void add_faces(const PlacedShape& placed, bool of_b, SupportPolygon& polygon) const;
 
   const btCollisionShape& shape() const { return *shape_; }

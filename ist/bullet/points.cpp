@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kPointsOfAManifold = MANIFOLD_CACHE_SIZE;
 
-/// A patch's name in the fields in which Bullet keeps the triangles of a point.
+/// Stores a patch's name in the fields in which Bullet keeps the triangles of a point.
 void set_name(btManifoldPoint& point, std::uint64_t id) {
   point.m_partId0 = static_cast<int>(id >> 32);
   point.m_index0 = static_cast<int>(id & 0xffffffffu);
@@ -23,8 +23,8 @@ bool same_name(const btManifoldPoint& a, const btManifoldPoint& b) {
   return a.m_partId0 == b.m_partId0 && a.m_index0 == b.m_index0;
 }
 
-/// The solver begins with the last step's impulses. What stopped an impact is not needed again: no
-/// more than twice what the point's spring gives in a step to bodies at rest.
+/// The solver starts with the last step's impulses. The impulse that stopped an impact is not
+/// needed again: the limit is twice the impulse of the point's spring in a step for bodies at rest.
 void forget_impact(btManifoldPoint& point, double step) {
   const btScalar most = static_cast<btScalar>(2 * step) * point.m_combinedContactStiffness1 *
                         std::max(-point.m_distance1, btScalar(0));
@@ -53,11 +53,11 @@ btVector3 friction_of(const btManifoldPoint& point) {
          point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2;
 }
 
-/// Bullet's friction stops the place at which a body touches when a step begins. Where a body
-/// rolls, that place moves on over it and has another speed when the next step begins. As a rod
-/// whirls on its rim, friction acts along this change in every step and drives the rod ever faster.
-/// So there it stops the place at which the body will touch. `before`: the friction of the step
-/// before the last one, since that may alternate; this function replaces it.
+/// Bullet's friction stops the point of contact at the beginning of a step. If a body rolls, that
+/// point moves over it and has another speed when the next step begins. As a rod whirls on its rim,
+/// friction acts along this change in every step and accelerates the rod. So friction acts here at
+/// the point at which the body will touch. `before`: the friction of the step before the last one,
+/// since that may alternate; this function replaces it.
 void stop_next_place(btManifoldPoint& point, const btCollisionObject& first,
                      const btCollisionObject& second, btVector3& before) {
   const auto speed_known = [](const btCollisionObject& object) {
@@ -88,7 +88,7 @@ void stop_next_place(btManifoldPoint& point, const btCollisionObject& first,
   point.m_contactMotion1 = -size;
 }
 
-/// Points that are replaced.
+/// Points that are being replaced.
 struct OldPoints {
   using Frictions = std::array<btVector3, Settings::kPatches>;
 
@@ -107,7 +107,7 @@ struct OldPoints {
     frictions[k] = frictions[count];
   }
 
-  /// The point of the same patch goes on in this one.
+  /// Continues the point of the same patch in this one.
   bool give_to(btManifoldPoint& point, btVector3& friction, double step) {
     for (std::size_t k = 0; k < count; ++k) {
       if (!same_name(points[k], point)) continue;
@@ -121,8 +121,8 @@ struct OldPoints {
     return false;
   }
 
-  /// A patch gets another name as it moves over the triangles: it still bears what the nearest one
-  /// bore that has no name any more.
+  /// A patch gets another name as it moves over the triangles: it takes over the impulse of the
+  /// nearest old point whose name has disappeared.
   void give_impulse_to(btManifoldPoint& point, btVector3& friction, double step) {
     std::size_t nearest = count;
     btScalar least = BT_LARGE_FLOAT;
@@ -197,7 +197,7 @@ void Points::move(const btCollisionObject& first, const btCollisionObject& secon
 
 Eigen::Vector3d Points::together(const btCollisionObject& first, const btCollisionObject& second,
                                  const Contact& contact, const Spring& spring) {
-  // Points that push against each other, as of wedged bodies, part none.
+  // Points that push against each other, as of wedged bodies, separate nothing.
   Eigen::Vector3d together = Eigen::Vector3d::Zero();
   double apart = 0;
   closing_ *= 1 - spring.step / (3 * (spring.step + spring.relaxation));
@@ -218,13 +218,13 @@ Eigen::Vector3d Points::together(const btCollisionObject& first, const btCollisi
 
 void Points::set_spring(btManifoldPoint& point, const ContactPatch& patch, const Spring& spring,
                         const Eigen::Vector3d& together) const {
-  // Bullet takes spring and damper, and makes of them the speed at which they part bodies,
-  // depth · spring / (step · spring + damper), and the impulse of a unit of speed that is missing.
-  // At rest, against what is placed, the force is the spring's.
+  // Bullet takes spring and damper, and computes from them the separating speed, depth · spring /
+  // (step · spring + damper), and the impulse per unit of missing speed. At rest, against a placed
+  // object, the force is the spring's.
   double stiffness = spring.at(patch.depth) * patch.area, relaxation = spring.relaxation;
   if (patch.depth > 0) {
     const double parting = spring.parting(patch.depth, together.dot(patch.normal));
-    // A point that moves along grows faster the deeper it is: a slight speed is no measure.
+    // A point that moves along grows faster the deeper it is, so a small speed is no reference.
     const double placed = to_eigen(unsaid_at(to_bullet(place_of(patch)))).dot(patch.normal);
     const double speed =
         parting +
@@ -267,8 +267,8 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
     const double approach =
         normal.dot(velocity_of(second, on_second) - velocity_of(first, on_first));
     if (point.m_combinedRestitution > 0 && approach > spring.slow) {
-      if (patch.depth < 0) continue;  // or the gap would take from the speed
-      // A damped spring would absorb the speed, so a point that bounces is rigid in this step.
+      if (patch.depth < 0) continue;  // else the gap would reduce the speed
+      // A damped spring would absorb the speed, so a bouncing point is rigid in this step.
       point.m_contactPointFlags |=
           BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP;
     } else {
@@ -280,7 +280,7 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
     points[used++] = point;
   }
   for (std::size_t i = 0; i < old.count; ++i) {
-    // Owners of user data are told that the old point is gone; its impulses may continue.
+    // Reports to owners of user data that the old point is gone; its impulses may continue.
     manifolds[0]->clearUserCache(old.points[i]);
   }
   for (std::size_t i = 0; i < used; ++i) {
@@ -297,7 +297,7 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
     const std::size_t at = i / kPointsOfAManifold;
     if (at == manifolds.size()) manifolds.push_back(dispatcher.getNewManifold(&first, &second));
     btPersistentManifold& manifold = *manifolds[at];
-    // Bullet forgets no point of ours by itself, as it does of a compound's children.
+    // Disables Bullet's own removal of points, as for a compound's children.
     manifold.setContactBreakingThreshold(BT_LARGE_FLOAT);
     manifold.setNumContacts(manifold.getNumContacts() + 1);
     manifold.getContactPoint(manifold.getNumContacts() - 1) = point;

@@ -10,21 +10,21 @@
 
 namespace ist::bullet {
 
-/// The point at which a patch pushes. A force on the wrench's axis leaves no torque but that about
-/// the axis. If a patch pushes in both directions the axis may lie far away: the point stays within
+/// The point at which a patch pushes. A force on the wrench's axis leaves only the torque about the
+/// axis. If a patch pushes in both directions the axis may be far away, so the point stays within
 /// the patch's width of its middle.
 Eigen::Vector3d place_of(const ContactPatch& patch);
 
 /// The points of a pair in Bullet's manifolds.
 class Points {
  public:
-  /// To where the bodies have moved.
+  /// Moves the points with the bodies.
   void move(const btCollisionObject& first, const btCollisionObject& second, double step);
-  /// A contact's points, in place of those there are. Reports where a contact begins or ends.
+  /// Replaces the points by those of a contact. Reports the beginning or end of a contact.
   void fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
             const Contact& contact, const Spring& spring, btDispatcher& dispatcher);
   std::size_t count() const;
-  /// The first one; made if there is none.
+  /// The first manifold; created if there is none.
   btPersistentManifold* first_manifold(const btCollisionObject& first,
                                        const btCollisionObject& second, btDispatcher& dispatcher);
   void release(btDispatcher& dispatcher);
@@ -33,7 +33,8 @@ class Points {
   std::vector<btPersistentManifold*> manifolds;  // the first ones are full
 
  private:
-  /// [u/s] At which the contact may part the bodies, in the direction in which all points push.
+  /// [u/s] Bound of the speed at which the contact may separate the bodies, in the direction in
+  /// which all points push.
   Eigen::Vector3d together(const btCollisionObject& first, const btCollisionObject& second,
                            const Contact& contact, const Spring& spring);
   void set_spring(btManifoldPoint& point, const ContactPatch& patch, const Spring& spring,
@@ -42,7 +43,7 @@ class Points {
 
   std::array<btVector3, Settings::kPatches> normals_;    // of all points, in the first's frame
   std::array<btVector3, Settings::kPatches> frictions_;  // of all points in the step before
-  double closing_ = 0;  // [u/s] of an impact, forgotten as the bodies part
+  double closing_ = 0;  // [u/s] of an impact, forgotten as the bodies separate
 };
 
 }  // namespace ist::bullet

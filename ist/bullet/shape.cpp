@@ -54,7 +54,8 @@ Shape::Shape(const AssetView& tree) : tree_(tree), frame_(body_frame(tree)) {
     warn("An asset without spheres collides with nothing: bake it with spheres.");
   }
   mesh_in_body_ = to_bullet(Eigen::Isometry3d(frame_.in_mesh.inverse()));
-  // Matched spheres stick out of the solid by this: what they meet there is a contact.
+  // Matched spheres protrude from the solid by this much: anything that they meet there is a
+  // contact.
   const Bounds box = bounds(tree);
   btTransformAabb(to_bullet(box.lower), to_bullet(box.upper),
                   static_cast<btScalar>(tree.protrusion()), mesh_in_body_, lower_, upper_);
@@ -107,7 +108,7 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
     if (TestTriangleAgainstAabb2(corners, lower, upper))
       callback->processTriangle(corners, 0, static_cast<int>(triangle));
   };
-  // A ray's triangles are found one after another, until one hit is the last that counts.
+  // A ray's triangles are found one after another, until a hit is the last relevant one.
   if (auto* const ray = dynamic_cast<btTriangleRaycastCallback*>(callback)) {
     const PlacedAsset mesh_placed{tree_, to_pose(mesh_in_body_), scale_};
     const Eigen::Vector3d from = to_eigen(ray->m_from), along = to_eigen(ray->m_to) - from;

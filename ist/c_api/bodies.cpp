@@ -28,14 +28,14 @@ void write(const Bounds& found, ist_bounds_t& out) noexcept {
   out.radius = found.radius;
 }
 
-/// Reads a placed asset as queries do, and refuses the poses that they refuse.
+/// Reads a placed asset like queries, and refuses the same poses.
 ist_status_t read_usable(const ist_placed_t* given, PlacedAsset& placed) noexcept {
   const ist_status_t status = c_api::read(given, placed);
   if (status != IST_OK) return status;
   return usable_rotation(placed.pose, placed.scale) ? IST_OK : IST_INVALID_INPUT;
 }
 
-/// Writes what `find(solid)` finds of a solid that `read(given, solid)` reads.
+/// Writes the result of `find(solid)` for a solid that `read(given, solid)` reads.
 template <class Solid, class Given, class Read, class Find, class Answer>
 ist_status_t tell(const Given* given, const Read& read, const Find& find, Answer* answer) noexcept {
   ist_status_t status = clear(answer);
@@ -77,7 +77,6 @@ ist_status_t find_wrenches(const Contact* contact, const ist_pose_t* b, const do
   return IST_OK;
 }
 
-/// The contact of C++ that has this wrench.
 Penetration with_wrench(const Wrench& on_b) noexcept {
   Penetration contact;
   contact.force = on_b.force;
@@ -194,7 +193,7 @@ ist_status_t ist_contact_force(const ist_contact_law_t* law, const ist_contact_p
   if (!(given.stiffness > 0 && std::isfinite(given.stiffness)) ||
       memory->count > ist::ContactMemory::kPatches)
     return IST_INVALID_INPUT;
-  // Both memories are plain numbers at the same places.
+  // Both memories are plain numbers in the same layout.
   ist::ContactMemory kept;
   std::memcpy(static_cast<void*>(&kept), memory, sizeof kept);
   const ist::ContactForce found =

@@ -21,10 +21,10 @@ struct CloseFile {
   void operator()(std::FILE* file) const noexcept { std::fclose(file); }
 };
 
-/// Reads all of a file into memory of the hooks. No pipe or device: its size must be known.
+/// Reads a whole file into memory from the hooks. Not a pipe or device: its size must be known.
 ist_status_t read_file(const char* path, const MemoryHooks& hooks, HookedArray<std::byte>& out) {
   const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path, "rb"));
-  // A folder can be opened, but nothing can be read of it, and its size is not one.
+  // A folder can be opened, but not read, and its size is meaningless.
   if (!file || (std::fgetc(file.get()) == EOF && std::ferror(file.get()) != 0) ||
       std::fseek(file.get(), 0, SEEK_END) != 0)
     return IST_CANNOT_READ;
@@ -129,8 +129,8 @@ ist_status_t ist_asset_release(ist_asset_t* asset) {
 }
 
 ist_status_t ist_asset_get_info(const ist_asset_t* asset, ist_asset_info_t* info) {
-  const ist_status_t room = clear(info);
-  if (room != IST_OK) return room;
+  const ist_status_t size_status = clear(info);
+  if (size_status != IST_OK) return size_status;
   AssetView view;
   const ist_status_t status = view_of(asset, view);
   if (status != IST_OK) return status;
@@ -150,8 +150,8 @@ ist_status_t ist_asset_get_info(const ist_asset_t* asset, ist_asset_info_t* info
 ist_status_t ist_asset_get_predicted_errors(const ist_asset_t* asset,
                                             ist_predicted_errors_t* errors) {
   static_assert(IST_TRIAL_PLATE == static_cast<int>(ist::TrialPartner::plate));
-  const ist_status_t room = clear(errors);
-  if (room != IST_OK) return room;
+  const ist_status_t size_status = clear(errors);
+  if (size_status != IST_OK) return size_status;
   AssetView view;
   const ist_status_t status = view_of(asset, view);
   if (status != IST_OK) return status;

@@ -7,18 +7,18 @@
 
 namespace ist::c_api {
 
-/// Memory of a C caller's; null is the heap.
+/// The allocator of a C caller; null uses the heap.
 struct Allocator {
   MemoryHooks hooks;
 
   static ist_status_t from(const ist_allocator_t* given, Allocator& out) noexcept;
 };
 
-/// A tree's handle. The mark tells one from what was never made without following a pointer.
+/// A tree's handle. The mark identifies invalid handles without following a pointer.
 struct AssetHandle {
   std::uint64_t mark;
   AssetView view;
-  void* bytes;  ///< that it owns, or null
+  void* bytes;  ///< owned, or null
   std::size_t size;
   MemoryHooks memory;
 
@@ -52,7 +52,7 @@ struct WorkspaceHandle {
 };
 static_assert(sizeof(WorkspaceHandle) <= sizeof(ist_workspace_t));
 
-/// A deadline has no handle of its own: all zero is one without a limit.
+/// A deadline has no handle: all zero means no limit.
 static_assert(sizeof(Deadline) <= sizeof(ist_deadline_t));
 inline Deadline& deadline_in(ist_deadline_t& deadline) noexcept {
   return *reinterpret_cast<Deadline*>(&deadline);

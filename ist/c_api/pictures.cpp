@@ -6,7 +6,8 @@
 #include "query/asset/mesh_parts.h"
 #include "query/asset/sphere_tree.h"
 
-// The contents of an asset, number by number, for callers that cannot read its layout; and lenses.
+// The contents of an asset, element by element, for callers that cannot read its layout; and
+// lenses.
 
 namespace ist::c_api {
 namespace {
@@ -29,7 +30,7 @@ class OwnFrame {
   Eigen::Vector3d centre_;
 };
 
-/// Writes the first `capacity` of the balls that `ball(i)` tells, i < count.
+/// Writes the first `capacity` of the balls ball(i), i < count.
 template <class BallOf>
 void write_balls(const OwnFrame& frame, std::size_t count, const BallOf& ball, ist_ball_t* out,
                  std::size_t capacity) noexcept {
@@ -52,7 +53,7 @@ ist_status_t get_balls(const AssetView& view, const ist_ball_set_t& set, ist_bal
   const SphereTree tree(asset, inner ? asset.inner_tree : matched_tree(asset, set.detail));
   if (set.level > static_cast<std::uint32_t>(tree.top)) return IST_INVALID_INPUT;
   const OwnFrame frame(asset);
-  const int level = static_cast<int>(set.level) - 1;  // whose nodes the balls are
+  const int level = static_cast<int>(set.level) - 1;  // of the nodes whose balls are written
   count = tree.count(level);
   if (level == kSphereLevel) {
     const Sphere* const spheres =

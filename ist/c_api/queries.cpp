@@ -16,35 +16,35 @@ ist_status_t worse(ist_status_t a, ist_status_t b) noexcept {
   return std::min(a, b) < 0 ? std::min(a, b) : std::max(a, b);
 }
 
-ist_status_t check_room(const ist_contact_patches_t* given) noexcept {
+ist_status_t check_capacity(const ist_contact_patches_t* given) noexcept {
   const ist_status_t status = check_size(given);
   if (status != IST_OK) return status;
   if (given->patch_size != sizeof(ist_contact_patch_t)) return IST_WRONG_SIZE;
   return given->patches == nullptr && given->capacity > 0 ? IST_NULL_POINTER : IST_OK;
 }
 
-std::span<ContactPatch> room_of(const ist_contact_patches_t& given) noexcept {
+std::span<ContactPatch> span_of(const ist_contact_patches_t& given) noexcept {
   return {reinterpret_cast<ContactPatch*>(given.patches), given.capacity};
 }
 
-/// `ask(a, b, settings, workspace, patches)` answers ContactPatches. `status`: of other arguments.
+/// `ask(a, b, settings, workspace, patches)` returns ContactPatches. `status`: of other arguments.
 template <class Solid, class Ask>
 ist_status_t find_patches(const ist_placed_t* a, const ist_placed_t* b,
                           const ist_contact_settings_t* given, ist_workspace_t* workspace,
                           ist_contact_patches_t* patches, ist_penetration_t* whole,
                           ist_status_t status, const Ask& ask) noexcept {
   if (status == IST_OK && whole != nullptr) status = check_size(whole);
-  if (const ist_status_t room = check_size(patches); room == IST_OK)
+  if (const ist_status_t size_status = check_size(patches); size_status == IST_OK)
     patches->count = 0;
   else if (status == IST_OK)
-    status = room;
-  if (status == IST_OK) status = check_room(patches);
+    status = size_status;
+  if (status == IST_OK) status = check_capacity(patches);
   ContactSettings settings;
   if (status == IST_OK) status = read(given, settings);
   ist_status_t answered = IST_OK;
   if (status == IST_OK)
     status = ask_about<Solid>(a, b, workspace, [&](const auto& x, const auto& y, auto& scratch) {
-      const ContactPatches found = ask(x, y, settings, scratch, room_of(*patches));
+      const ContactPatches found = ask(x, y, settings, scratch, span_of(*patches));
       patches->count = found.count;
       if (whole != nullptr) write(found.penetration, *whole);
       answered = status_of(found.penetration.status);
@@ -55,7 +55,7 @@ ist_status_t find_patches(const ist_placed_t* a, const ist_placed_t* b,
   return status;
 }
 
-/// `ask(a, b, workspace)` gives a YesNoAnswer.
+/// `ask(a, b, workspace)` returns a YesNoAnswer.
 template <class Ask>
 ist_status_t find_overlap(const ist_placed_t* a, const ist_placed_t* b, ist_workspace_t* workspace,
                           ist_yes_no_t* answer, const Ask& ask) noexcept {
@@ -69,7 +69,7 @@ ist_status_t find_overlap(const ist_placed_t* a, const ist_placed_t* b, ist_work
   });
 }
 
-ist_status_t check_room(ist_outline_t* given) noexcept {
+ist_status_t check_capacity(ist_outline_t* given) noexcept {
   const ist_status_t status = check_size(given);
   if (status != IST_OK) return status;
   given->total = given->count = 0;
@@ -77,7 +77,7 @@ ist_status_t check_room(ist_outline_t* given) noexcept {
   return given->segments == nullptr && given->capacity > 0 ? IST_NULL_POINTER : IST_OK;
 }
 
-/// ask(placed, i) for each of `count`; the least of their statuses.
+/// Calls ask(placed, i) for each of `count`; returns the worst of their statuses.
 template <class Ask>
 ist_status_t ask_each(const ist_placed_t* given, std::size_t count, bool there,
                       const Ask& ask) noexcept {
@@ -94,7 +94,7 @@ bool is_finite(const Motion& motion) noexcept {
          motion.about.allFinite();
 }
 
-/// The memory of the workers that answer pairs.
+/// The workspaces of the workers that answer pairs.
 struct Staff {
   ist_workspace_t* workspaces;
   std::size_t workers;
@@ -109,7 +109,8 @@ struct Staff {
   }
 };
 
-/// answers[i] by ask(i, workspace), or `unknown` without workers. `Settings`: of C++, for `given`.
+/// Sets answers[i] to ask(i, workspace), or to `unknown` without workers. `Settings`: of C++, for
+/// `given`.
 template <class Settings, class Given, class Answer, class Unknown, class Ask>
 ist_status_t answer_pairs(std::size_t count, const Given* given, const Staff& staff,
                           Answer* answers, std::size_t answer_size, const Unknown& unknown,
@@ -129,7 +130,7 @@ ist_status_t answer_pairs(std::size_t count, const Given* given, const Staff& st
                                   : ParallelFor{staff.parallel->run, staff.parallel->pool};
   answer_all(count, staff.workers, threads, [&](std::size_t i, std::size_t worker) {
     answers[i].size = sizeof answers[i];
-    // A pool that counts wrongly is told by the answer.
+    // A pool with a wrong worker index is reported in the answer.
     ask(i, worker < staff.workers ? staff.workspaces + worker : nullptr);
   });
   return IST_OK;
@@ -152,8 +153,8 @@ ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_pl
                                     const ist_placed_t* b, ist_penetration_t* answer) {
   ist_status_t status = check_size(whole);
   const ist::Penetration before = status == IST_OK ? read(*whole) : ist::Penetration{};
-  const ist_status_t room = clear(answer);  // which may be `whole`
-  if (room != IST_OK) return room;
+  const ist_status_t size_status = clear(answer);  // it may alias `whole`
+  if (size_status != IST_OK) return size_status;
   ist::PlacedAsset first, second;
   if (status == IST_OK) status = read(a, first);
   if (status == IST_OK) status = read(b, second);
@@ -190,8 +191,9 @@ ist_status_t ist_query(const ist_placed_t* a, const ist_placed_t* b,
                        const ist_separation_settings_t* separation_settings,
                        ist_workspace_t* workspace, ist_penetration_t* penetration,
                        ist_separation_t* separation) {
-  const ist_status_t room = check_size(penetration), other_room = check_size(separation);
-  ist_status_t status = worse(room, other_room);
+  const ist_status_t penetration_status = check_size(penetration),
+                     separation_status = check_size(separation);
+  ist_status_t status = worse(penetration_status, separation_status);
   ist::QuerySettings settings;
   if (status == IST_OK)
     status = worse(read(penetration_settings, settings.penetration),
@@ -205,8 +207,8 @@ ist_status_t ist_query(const ist_placed_t* a, const ist_placed_t* b,
           return ist_status_t{IST_OK};
         });
   if (status == IST_OK) return worse(penetration->status, separation->status);
-  if (room == IST_OK) refuse<ist::Penetration>(status, *penetration);
-  if (other_room == IST_OK) refuse<ist::Separation>(status, *separation);
+  if (penetration_status == IST_OK) refuse<ist::Penetration>(status, *penetration);
+  if (separation_status == IST_OK) refuse<ist::Separation>(status, *separation);
   return status;
 }
 
@@ -223,22 +225,22 @@ ist_status_t ist_overlap_outline(const ist_placed_t* a, const ist_placed_t* b,
                                  ist_contact_patches_t* patches, ist_outline_t* outline,
                                  ist_penetration_t* whole) {
   const auto ask = [&](const auto& x, const auto& y, const ist::ContactSettings& by,
-                       ist::Workspace& scratch, std::span<ist::ContactPatch> room) {
+                       ist::Workspace& scratch, std::span<ist::ContactPatch> out) {
     const ist::OverlapOutline found = ist::overlap_outline(
-        x, y, by, scratch, room,
+        x, y, by, scratch, out,
         {reinterpret_cast<ist::OutlineSegment*>(outline->segments), outline->capacity});
     outline->total = found.segments;
     outline->count = std::min(found.segments, outline->capacity);
     return found.contact;
   };
   return find_patches<ist::PlacedAsset>(a, b, settings, workspace, patches, whole,
-                                        check_room(outline), ask);
+                                        check_capacity(outline), ask);
 }
 
 ist_status_t ist_patches_without_protrusion(const ist_placed_t* a, const ist_placed_t* b,
                                             const ist_contact_settings_t* settings,
                                             ist_contact_patches_t* patches) {
-  ist_status_t status = check_room(patches);
+  ist_status_t status = check_capacity(patches);
   if (status == IST_OK && patches->count > patches->capacity) status = IST_INVALID_INPUT;
   ist::PlacedAsset first, second;
   if (status == IST_OK) status = read(a, first);
@@ -247,7 +249,7 @@ ist_status_t ist_patches_without_protrusion(const ist_placed_t* a, const ist_pla
   if (status == IST_OK) status = read(settings, found_with);
   if (status == IST_OK && !ist::relative_pose(first, second)) status = IST_INVALID_INPUT;
   if (status != IST_OK) return status;
-  ist::without_protrusion(room_of(*patches).first(patches->count), first, second, found_with);
+  ist::without_protrusion(span_of(*patches).first(patches->count), first, second, found_with);
   return IST_OK;
 }
 
@@ -303,7 +305,7 @@ ist_status_t ist_moved(const ist_pose_t* start, double scale, const ist_motion_t
                        double time, ist_pose_t* end) {
   if (end == nullptr) return IST_NULL_POINTER;
   const ist::Pose from = start == nullptr ? ist::Pose() : pose(*start);
-  *end = {};  // which may be `start`
+  *end = {};  // it may alias `start`
   if (start == nullptr || motion == nullptr) return IST_NULL_POINTER;
   if (scale == 0) scale = 1;
   const ist::Pose to = ist::moved(from, read(motion), time, scale);
@@ -355,7 +357,7 @@ ist_status_t ist_contact_patches_batch(const ist_pair_t* pairs, std::size_t coun
                                        ist_contact_patches_t* patches, ist_penetration_t* wholes,
                                        std::size_t whole_size, const ist_parallel_t* parallel) {
   if (count > 0 && (pairs == nullptr || patches == nullptr)) return IST_NULL_POINTER;
-  // All are of one size, or there is no telling where the next one begins.
+  // All must have one size, since it gives the distance between elements.
   for (std::size_t i = 0; i < count; ++i) {
     const ist_status_t status = check_size(patches + i);
     if (status != IST_OK) return status;

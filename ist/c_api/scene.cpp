@@ -16,7 +16,7 @@ struct OwnedScene {
   const void* context = nullptr;
 };
 
-/// A scene's handle. The mark tells one from what was never made without following the pointer.
+/// A scene's handle. The mark identifies invalid handles without following the pointer.
 struct SceneHandle {
   std::uint64_t mark;
   OwnedScene* owned;
@@ -26,7 +26,7 @@ struct SceneHandle {
 };
 static_assert(sizeof(SceneHandle) <= sizeof(ist_scene_t));
 
-/// use(scene) of a handle that was made, whose status is returned.
+/// Calls use(scene) for a valid handle and returns the status.
 template <class Handle, class Use>
 ist_status_t with_scene(Handle* handle, const Use& use) noexcept {
   if (handle == nullptr) return IST_NULL_POINTER;
@@ -61,7 +61,7 @@ ist_status_t read(const ist_scene_rule_t* given, SceneRule& rule) noexcept {
   return IST_OK;
 }
 
-// Pairs and patches are told where they lie.
+// Pairs and patches are returned as pointers.
 static_assert(sizeof(ist_scene_pair_t) == sizeof(ScenePair));
 static_assert(offsetof(ist_scene_pair_t, b) == offsetof(ScenePair, b));
 static_assert(offsetof(ist_scene_pair_t, stays) == offsetof(ScenePair, event));
@@ -73,7 +73,7 @@ static_assert(offsetof(ist_scene_pair_t, patch_count) == offsetof(ScenePair, pat
 static_assert(sizeof(ist_scene_pair_name_t) == sizeof(ScenePairName));
 static_assert(offsetof(ist_scene_pair_name_t, b) == offsetof(ScenePairName, b));
 
-/// set(scene, numbers, values) of as many as there are: values as C++ has them.
+/// Calls set(scene, numbers, values) with values converted to C++.
 template <class Value, class Given, class Set>
 ist_status_t set_all(ist_scene_t* scene, const std::uint32_t* numbers, const Given* values,
                      std::size_t count, const Set& set) noexcept {

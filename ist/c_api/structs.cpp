@@ -27,7 +27,7 @@ ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& se
 ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) noexcept {
   if (given == nullptr) return IST_OK;
   if (given->size != sizeof *given) return IST_WRONG_SIZE;
-  if (given->duration == 0) return IST_NO_DURATION;  // left as it was zeroed
+  if (given->duration == 0) return IST_NO_DURATION;  // still zero as initialised
   settings.duration = given->duration;
   settings.tolerance = given->tolerance;
   settings.max_visits = given->max_visits;

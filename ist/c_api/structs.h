@@ -13,11 +13,11 @@
 #include "query/base/members.h"
 #include "query/base/no_answer.h"
 
-// C structs to and from those of C++: checked, then copied number by number.
+// Conversion of C structs to and from C++: checked, then copied number by number.
 
 namespace ist::c_api {
 
-/// Whether a struct is there and of a size that this library knows.
+/// True if a struct is not null and has a size that this library knows.
 template <class T>
 ist_status_t check_size(const T* given) noexcept {
   if (given == nullptr) return IST_NULL_POINTER;
@@ -49,7 +49,7 @@ inline void write(const Pose& found, ist_pose_t& out) noexcept {
   std::copy_n(found.t, 3, out.t);
 }
 
-/// By QueryStatus.
+/// Indexed by QueryStatus.
 inline constexpr ist_status_t kStatuses[] = {IST_OK, IST_BUDGET_EXHAUSTED, IST_INVALID_INPUT,
                                              IST_MISSING_DATA, IST_ERROR_EXCEEDED};
 inline ist_status_t status_of(QueryStatus status) noexcept {
@@ -61,18 +61,18 @@ inline QueryStatus query_status(ist_status_t status) noexcept {
                                       : static_cast<QueryStatus>(found - kStatuses);
 }
 
-// What an asset's bytes lack has the same order in both, downwards.
+// The statuses of invalid asset bytes are in the same order in both, descending.
 static_assert(IST_TOO_SHORT - IST_CORRUPT_LAYOUT == static_cast<int>(AssetStatus::corrupt_layout) -
                                                         static_cast<int>(AssetStatus::too_short));
 inline ist_status_t status_of(AssetStatus status) noexcept {
   return status == AssetStatus::ok ? IST_OK : IST_TOO_SHORT + 1 - static_cast<int>(status);
 }
-/// Of one from IST_TOO_SHORT to IST_CORRUPT_LAYOUT.
+/// For a status from IST_TOO_SHORT to IST_CORRUPT_LAYOUT.
 inline AssetStatus asset_status_of(ist_status_t status) noexcept {
   return static_cast<AssetStatus>(IST_TOO_SHORT + 1 - status);
 }
 
-/// Copies an answer from C++ to C or back. Padding is 0, so that the bytes can be compared.
+/// Copies an answer from C++ to C or back. Padding is set to 0, so that the bytes can be compared.
 template <class From, class To>
 requires requires(From from, To to) { from.status, to.status; }
 void write(const From& from, To& to) noexcept {
@@ -99,9 +99,9 @@ void write(const From& from, To& to) noexcept {
       from, to);
 }
 
-/// The shape of a function points to the caller's struct and reads it for every sample.
+/// The shape of a function points to the caller's struct, which is read for every sample.
 ist_status_t read(const ist_placed_t* given, PlacedSolid& placed) noexcept;
-/// An asset: IST_MISSING_DATA for a shape.
+/// Reads an asset: IST_MISSING_DATA for a shape.
 ist_status_t read(const ist_placed_t* given, PlacedAsset& placed) noexcept;
 
 ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& settings) noexcept;
@@ -113,7 +113,7 @@ inline Ray read(const ist_ray_t& given) noexcept {
   if (given.max_distance != 0) ray.max_distance = given.max_distance;
   return ray;
 }
-/// Null: at rest.
+/// Null means at rest.
 inline Motion read(const ist_motion_t* given) noexcept {
   if (given == nullptr) return {};
   return {vector(given->velocity), vector(given->angular_velocity), vector(given->about)};
@@ -138,15 +138,14 @@ static_assert(offsetof(ist_contact_patch_t, torque) == offsetof(ContactPatch, to
 static_assert(offsetof(ist_contact_patch_t, point) == offsetof(ContactPatch, point));
 static_assert(offsetof(ist_contact_patch_t, torsion) == offsetof(ContactPatch, torsion));
 
-// So are segments of outlines.
 static_assert(std::is_standard_layout_v<OutlineSegment>);
 static_assert(sizeof(ist_outline_segment_t) == sizeof(OutlineSegment));
 static_assert(offsetof(ist_outline_segment_t, from) == offsetof(OutlineSegment, from));
 static_assert(offsetof(ist_outline_segment_t, to) == offsetof(OutlineSegment, to));
 static_assert(offsetof(ist_outline_segment_t, patch) == offsetof(OutlineSegment, patch));
 
-/// Reads what every query has, then runs `ask(a, b, workspace)`, which returns its status. `Solid`:
-/// PlacedSolid, or PlacedAsset where only assets have an answer.
+/// Reads the arguments common to all queries, then runs `ask(a, b, workspace)`, which returns its
+/// status. `Solid`: PlacedSolid, or PlacedAsset for queries of assets only.
 template <class Solid, class Ask>
 ist_status_t ask_about(const ist_placed_t* a, const ist_placed_t* b, ist_workspace_t* workspace,
                        const Ask& ask) noexcept {
@@ -158,14 +157,14 @@ ist_status_t ask_about(const ist_placed_t* a, const ist_placed_t* b, ist_workspa
   return scratch == nullptr ? status : ask(first, second, *scratch);
 }
 
-/// An answer to a refused query: all numbers are NaN, as in an unanswerable one.
+/// The answer of a refused query: all numbers are NaN, like those of an unanswerable one.
 template <class Found, class Answer>
 ist_status_t refuse(ist_status_t status, Answer& answer) noexcept {
   write(invalid_input<Found>(), answer);
   return answer.status = status;
 }
 
-/// A query with settings and one answer: `ask(a, b, settings, workspace)` finds it, a `Found`.
+/// A query with settings and one answer: `ask(a, b, settings, workspace)` returns it, a `Found`.
 template <class Settings, class Found, class Given, class Answer, class Ask>
 ist_status_t answer_with(const ist_placed_t* a, const ist_placed_t* b, const Given* given,
                          ist_workspace_t* workspace, Answer* answer, const Ask& ask) noexcept {

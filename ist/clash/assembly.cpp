@@ -25,7 +25,7 @@ bool names(const Pattern& patterns, const std::string& name) {
   });
 }
 
-/// A group's name stands for its parts.
+/// Replaces groups' names by their parts.
 std::vector<Assembly::Rule> rules_of(ClashSource& source) {
   const auto set = [&](const Pattern& patterns) {
     std::vector<bool> found;
@@ -48,7 +48,8 @@ std::vector<Assembly::Rule> rules_of(ClashSource& source) {
   return rules;
 }
 
-/// Rows of a sweep: a robot's joints by column; or a part's pose a line, lines of one id together.
+/// Reads the rows of a sweep: a robot's joints by column; or a part's pose per line, consecutive
+/// lines of one id together.
 std::vector<Assembly::Row> read_poses(const std::string& path, const ClashSource& source,
                                       const std::vector<Pose>& still) {
   std::istringstream text(read_source_file(path).bytes);
@@ -144,7 +145,7 @@ std::vector<Assembly::Row> joint_rows(const std::vector<JointRange>& ranges,
   return rows;
 }
 
-/// A shape's asset, or why there is none, and what its parts are told.
+/// A shape's asset, or the reason why there is none, and notes for its parts.
 struct Made {
   std::shared_ptr<const Asset> asset;
   std::string fault;
@@ -162,7 +163,7 @@ Made make(const ClashShape& shape, const MeshSettings& closing) {
     }
     const ClosedMesh closed = close_as_asked(shape.mesh(), shape.name, closing);
     out.notes = closed.report.notes;
-    // One thread: many shapes are made at once.
+    // A single thread: many shapes are made at once.
     out.asset = std::make_shared<const Asset>(bake_mesh_only(closed, 1));
   } catch (const Error& error) {
     out.fault = error.what();

@@ -9,13 +9,13 @@
 namespace ist {
 namespace {
 
-/// FNV-1a from another start.
+/// FNV-1a with another initial value.
 std::uint64_t hash(std::string_view text, std::uint64_t value) {
   for (const char c : text) value = (value ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
   return value;
 }
 
-/// A name-based UUID (version 8): the same for the same words.
+/// A name-based UUID (version 8): deterministic.
 std::string guid(const std::string& words) {
   const std::uint64_t high = hash(words, 0xcbf29ce484222325u), low = hash(words, ~high);
   return fmt::format("{:08x}-{:04x}-8{:03x}-{:04x}-{:012x}", high >> 32, high >> 16 & 0xffff,
@@ -39,7 +39,7 @@ class Zip {
     memory.ztell64_file = [](void* self, void*) -> ZPOS64_T {
       return static_cast<Zip*>(self)->at_;
     };
-    memory.zseek64_file = [](void* self, void*, ZPOS64_T to, int) -> long {  // always to a place
+    memory.zseek64_file = [](void* self, void*, ZPOS64_T to, int) -> long {  // always absolute
       static_cast<Zip*>(self)->at_ = to;
       return 0;
     };
@@ -65,7 +65,7 @@ class Zip {
   std::size_t at_ = 0;
 };
 
-/// An IFC's element, where its part is named after its 22 letters; else by the part's name.
+/// An IFC element, if its part is named by its 22 letters; else by the part's name.
 std::string component(const std::string& name) {
   const bool ifc =
       name.size() == 22 &&
@@ -104,7 +104,7 @@ std::string clashes_bcf(const ClashReport& report, const std::string& date) {
                         kXml, topic, xml_text(a), xml_text(b), date, c.volume, c.depth,
                         place_text(c.centroid), c.pose.empty() ? "" : ", pose ", xml_text(c.pose),
                         view));
-    // From where all of a cube around the overlap is seen.
+    // A distance from which a cube around the overlap is visible.
     const double away = 8 * std::max(std::cbrt(c.volume_max), c.depth);
     const Eigen::Vector3d look = Eigen::Vector3d(-1, 1, -1).normalized();
     zip.add(topic + "/viewpoint.bcfv",

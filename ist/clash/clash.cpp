@@ -24,7 +24,8 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::size_t kPatches = 512;
-constexpr double kFlush = 1e-7;  ///< faces that are as near, of the smaller part's diameter
+constexpr double kFlush =
+    1e-7;  ///< faces within this distance are flush, relative to the smaller part's diameter
 
 struct Scratch {
   Workspace workspace;
@@ -35,11 +36,11 @@ double reach(const Bounds& box) {
   return std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
 }
 
-/// A part's kept mesh where it stands.
+/// A part's kept mesh in the world frame.
 struct WorldMesh {
-  /// A triangle's plane, seen from either side: n · x = offset.
+  /// A triangle's plane, from either side: n · x = offset.
   struct Plane {
-    double key;  ///< the same for equal planes, and else for hardly any two
+    double key;  ///< equal for equal planes, and for hardly any others
     Vector3d normal;
     double offset;
   };
@@ -54,7 +55,7 @@ struct WorldMesh {
       const Vector3d own = unit * vector(mesh.vertex(v)) + Vector3d(asset.centre);
       vertices.emplace_back(place * Vector3d(solid.scale * own));
     }
-    // No direction of a part is like it.
+    // A direction unlikely to occur in a part.
     const Vector3d across(0.267, 0.534, 0.802);
     for (std::uint32_t b = 0; b < mesh.count; ++b) {
       const MeshBlock& block = mesh.blocks[b];
@@ -99,13 +100,13 @@ struct WorldMesh {
 
 constexpr double kParallel = 1e-7;  ///< of normals
 
-/// Whether a plane of one lies within this [u] of one of the other: of one assembly of this size.
+/// True if a plane of one is within `within` [u] of one of the other, in an assembly of this size.
 bool have_common_plane(const WorldMesh& a, const WorldMesh& b, double size, double within) {
-  const double room = within + kParallel * size;  // of keys
+  const double margin = within + kParallel * size;  // of keys
   std::size_t first = 0;
   for (const WorldMesh::Plane& plane : a.planes) {
-    while (first < b.planes.size() && b.planes[first].key < plane.key - room) ++first;
-    for (std::size_t i = first; i < b.planes.size() && b.planes[i].key <= plane.key + room; ++i)
+    while (first < b.planes.size() && b.planes[first].key < plane.key - margin) ++first;
+    for (std::size_t i = first; i < b.planes.size() && b.planes[i].key <= plane.key + margin; ++i)
       if (std::abs(b.planes[i].offset - plane.offset) <= within &&
           (b.planes[i].normal - plane.normal).norm() <= kParallel)
         return true;
@@ -113,14 +114,14 @@ bool have_common_plane(const WorldMesh& a, const WorldMesh& b, double size, doub
   return false;
 }
 
-/// The faces of two parts that face each other no farther apart than a tolerance.
+/// The faces of two parts that face each other within a tolerance.
 class FlushFaces {
  public:
   /// `within`: a box that contains the contact. `touch` [u].
   FlushFaces(const WorldMesh& a, const WorldMesh& b, const Eigen::AlignedBox3d& within,
              double touch)
       : touch_(touch) {
-    // Faces in the order in which a plane across x comes to their boxes.
+    // Faces in the order in which a sweep along x reaches their boxes.
     struct Item {
       Eigen::AlignedBox3d box;
       const WorldMesh::Face* face;
@@ -149,7 +150,7 @@ class FlushFaces {
   }
 
   double area = 0;                     ///< [u²] measured on the first part
-  Vector3d moment = Vector3d::Zero();  ///< [u³] area times place, half way between both
+  Vector3d moment = Vector3d::Zero();  ///< [u³] area times position, halfway between both
 
  private:
   /// The part of a convex polygon with from + along · x ≥ 0.
@@ -188,7 +189,7 @@ class FlushFaces {
   double touch_;
 };
 
-/// A part as pairs see it.
+/// A part in the form that pairs use.
 struct Placed {
   Placed(const ClashPart& given, const ClashSettings& settings) : part(given) {
     const PlacedAsset& solid = part.solid;
@@ -207,7 +208,7 @@ struct Placed {
     volume = solid.asset.volume() * solid.scale * solid.scale * solid.scale;
     diameter = 2 * world.radius;
   }
-  /// Made when it is asked for first. `all`: a box around the assembly.
+  /// Built at the first use. `all`: a box around the assembly.
   const WorldMesh& mesh(const Eigen::AlignedBox3d& all) const {
     std::call_once(once_, [&] { mesh_.emplace(part.solid, all.center(), all.diagonal().norm()); });
     return *mesh_;
@@ -215,9 +216,9 @@ struct Placed {
 
   const ClashPart& part;
   Eigen::AlignedBox3d box;
-  double margin = 0;   ///< [u] by which the box is wider
-  double touch = 0;    ///< [u] its share of what counts as touching
-  double rounded = 0;  ///< [u] how far rounding alone may move its surface
+  double margin = 0;   ///< [u] enlargement of the box
+  double touch = 0;    ///< [u] its share of the touching distance
+  double rounded = 0;  ///< [u] bound on the motion of its surface by rounding
   double volume = 0, diameter = 0;
 
  private:
@@ -259,9 +260,9 @@ struct Sums {
   double volume = 0, area = 0;  ///< [u³], [u²] the patches' areas
   Vector3d force = Vector3d::Zero();
 
-  /// Faces of one direction have more than a quarter of their area along it; a pin's cancel.
-  bool has_way_out() const { return force.norm() > area / 4; }
-  double depth() const { return volume / (has_way_out() ? force.norm() : area); }
+  /// True if more than a quarter of the faces' area points in one direction; those of a pin cancel.
+  bool has_exit() const { return force.norm() > area / 4; }
+  double depth() const { return volume / (has_exit() ? force.norm() : area); }
 };
 
 class PairQuery {
@@ -275,7 +276,7 @@ class PairQuery {
         clearance_(settings.clearance),
         scratch_(scratch) {}
 
-  /// False: there is nothing to list.
+  /// Returns false if there is nothing to report.
   bool ask(Clash& out) {
     Penetration found;
     const Sums whole = patches(b_.part.solid, found, &out.depth);
@@ -292,16 +293,16 @@ class PairQuery {
       out.depth = 0;  // patches may be rounding alone
       return found.touching ? touches(found, out) : is_near(out);
     }
-    if (whole.has_way_out()) out.direction = unit(whole.force);
-    // Flush sides do not matter where the depth is rounding.
+    if (whole.has_exit()) out.direction = unit(whole.force);
+    // Flush sides are irrelevant if the depth is rounding.
     const bool deep = out.depth > 1e-3 * std::min(a_.diameter, b_.diameter);
-    if (deep && whole.has_way_out() && may_be_flush()) way_out(out, whole);
+    if (deep && whole.has_exit() && may_be_flush()) measure_exit(out, whole);
     if (out.depth <= touch_ && deepest_vertex() <= touch_) {
       measure_contact(out);
       return true;
     }
     out.kind = ClashKind::overlapping;
-    if (!deep && whole.has_way_out() && may_be_flush()) way_out(out, whole);
+    if (!deep && whole.has_exit() && may_be_flush()) measure_exit(out, whole);
     const double most = std::max(a_.volume, b_.volume);
     const double noise = 1e-9 + 20 * (a_.rounded + b_.rounded) / std::cbrt(most);
     out.duplicate = most - out.volume <= std::min(noise, 0.01) * most;
@@ -329,14 +330,13 @@ class PairQuery {
     const double rounding = found.volume_max - found.volume_min;
     for (const auto& [id, sums] : parts) {
       if (depth == nullptr || !(sums.volume > 0)) continue;
-      // Of a part that is rounding the area is, too.
+      // If the part is rounding, so is its area.
       const double most = sums.volume > rounding ? diameter : std::cbrt(sums.volume);
       *depth = std::max(*depth, sums.area > 0 ? std::min(sums.depth(), most) : most);
     }
     return whole;
   }
 
-  /// The overlap once B has moved.
   Penetration aside(const Vector3d& by) {
     return penetration(a_.part.solid, moved(by), kExactly, scratch_.workspace);
   }
@@ -346,9 +346,9 @@ class PairQuery {
                              kFlush * std::min(a_.diameter, b_.diameter));
   }
 
-  /// Where sides are flush the volume falls in both directions across them: the mean of two
-  /// positions a little aside cancels that.
-  void way_out(Clash& out, const Sums& whole) {
+  /// Along a direction with flush sides, the volume decreases both ways: averaging two slightly
+  /// displaced positions cancels that.
+  void measure_exit(Clash& out, const Sums& whole) {
     const Vector3d by =
         std::min(kFlush * std::min(a_.diameter, b_.diameter), 1e-3 * out.depth) * out.direction;
     Vector3d force = aside(-by).force;
@@ -365,7 +365,7 @@ class PairQuery {
     return solid;
   }
 
-  /// [u] How far a vertex of either solid lies inside the other, as far as it matters.
+  /// [u] The largest depth of a vertex of either solid inside the other, up to a relevant limit.
   double deepest_vertex() const {
     const Eigen::AlignedBox3d both = a_.box.intersection(b_.box);
     double deepest = 0;
@@ -420,7 +420,7 @@ class PairQuery {
   const Eigen::AlignedBox3d& all_;
   const double touch_, clearance_;
   Scratch& scratch_;
-  std::size_t parts_ = 0;  ///< connected ones that patches() found
+  std::size_t parts_ = 0;  ///< connected parts that patches() found
 };
 
 }  // namespace
@@ -485,7 +485,7 @@ std::vector<Clash> find_clashes(std::span<const ClashPart> parts, const ClashSet
 
 bool is_worse(const Clash& x, const Clash& y) {
   const auto rank = [](const Clash& c) {
-    // Pairs without an answer come first: nothing is known of their volume.
+    // Pairs without an answer come first, as their volume is unknown.
     return std::tuple(c.status != QueryStatus::ok ? 0 : 1, static_cast<int>(c.kind),
                       c.kind == ClashKind::overlapping ? -c.volume : 0.0, c.distance_min,
                       -c.contact_area);

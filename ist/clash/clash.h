@@ -12,26 +12,26 @@ namespace ist {
 
 inline constexpr double kFloat32 = 0x1p-23, kFloat64 = 0x1p-52;
 
-/// A part of an assembly. Its asset keeps a mesh.
+/// A part of an assembly. Its asset has a mesh.
 struct ClashPart {
   std::string name;
   PlacedAsset solid;
-  /// The rounding of its coordinates, as a fraction of them: that of float32 or of float64.
+  /// The relative rounding of its coordinates: that of float32 or of float64.
   double rounding = 0;
-  double slack = 0;           ///< [u] how far its mesh may lie from the shape that is meant
+  double slack = 0;           ///< [u] bound on the distance of its mesh from the intended shape
   double placing = kFloat64;  ///< the rounding of its pose
 };
 
-/// [u] How far rounding and slack let its surface lie from where it is meant to be, at most.
+/// [u] Bound on the distance of its surface from the intended place, by rounding and slack.
 double uncertainty_of(const ClashPart& part);
 
-/// How coordinates of a mesh's file are rounded: as its format stores them.
+/// The rounding of coordinates in a mesh's file, as determined by its format.
 double rounding_of_file(const std::string& path);
 
 struct ClashSettings {
-  double clearance = 0;  ///< [u] ≥ 0: pairs that are nearer are listed too
-  /// [u] Parts that reach no further into each other than this touch, and so do parts that are no
-  /// further apart. Below 0: what rounding and slack of both parts come to.
+  double clearance = 0;  ///< [u] ≥ 0: nearer pairs are listed too
+  /// [u] Parts that penetrate each other no further than this touch, and so do parts within this
+  /// distance. Negative: the sum of rounding and slack of both parts.
   double touch_within = -1;
   unsigned threads = 0;  ///< 0: all cores
 };
@@ -43,47 +43,47 @@ enum class ClashKind { overlapping, touching, apart };
 struct Clash {
   std::size_t a = 0, b = 0;
   ClashKind kind = ClashKind::apart;
-  double volume = 0, volume_min = 0, volume_max = 0;  ///< [u³] of the overlap, and bounds of it
-  /// [u²] Touching: of the faces that lie on each other; where they do so within the tolerance
-  /// alone, of the overlap once B has moved by this towards A.
+  double volume = 0, volume_min = 0, volume_max = 0;  ///< [u³] of the overlap, with bounds
+  /// [u²] For touching parts: area of the faces that lie on each other; if they do so only within
+  /// the tolerance, that of the overlap once B has moved by the tolerance towards A.
   double contact_area = 0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< of the overlap or the contact
-  /// Unit, in which B leaves A; zero if there is no single one.
+  /// Unit direction in which B leaves A; zero if there is no single one.
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-  /// Mean depth of the overlap's deepest connected part: its volume over its area seen along
+  /// Mean depth of the overlap's deepest connected part: its volume over its area projected along
   /// `direction`. If one solid is wholly inside the other, the diameter of its bounds.
   double depth = 0;
   double distance_min = 0, distance_max = 0;
-  QueryStatus status = QueryStatus::ok;  ///< not ok: told as overlapping, since it may be
-  bool duplicate = false;                ///< both are one shape in one place
-  std::string pose;                      ///< of a sweep: where it was found
+  QueryStatus status = QueryStatus::ok;  ///< not ok: reported as overlapping, since it may be
+  bool duplicate = false;                ///< both are the same shape in the same place
+  std::string pose;                      ///< of a sweep: the row
 };
 
-/// Adds a note where rounding alone moves parts by a thousandth of their size, and decides.
+/// Adds a note if rounding alone moves parts by a thousandth of their size, which is then decisive.
 void note_rounding(std::span<const ClashPart> parts, const ClashSettings& settings,
                    std::vector<std::string>& notes);
 
-/// Pairs that nobody asks for, by indices of parts.
+/// Pairs to skip, by indices of parts.
 using PairFilter = std::function<bool(std::size_t a, std::size_t b)>;
 
-/// All pairs that overlap, touch or are nearer than the clearance, by the exact measure; in the
-/// order of a, then b. The same bits for any number of threads. Throws Error, naming the part, for
-/// a pose or a scale that is invalid, or an asset without a mesh.
+/// All pairs that overlap, touch or are nearer than the clearance, by the exact measure; sorted by
+/// a, then b. The same bits for any number of threads. Throws Error, naming the part, for an
+/// invalid pose or scale, or an asset without a mesh.
 std::vector<Clash> find_clashes(std::span<const ClashPart> parts, const ClashSettings& settings,
                                 const PairFilter& ignored = {});
 
-/// Whether x is the worse of two clashes of the same parts: by kind, volume, area, nearness.
+/// True if x is the worse of two clashes of the same parts: by kind, volume, area, distance.
 bool is_worse(const Clash& x, const Clash& y);
 
 struct ClashReport {
   using Names = std::pair<std::string, std::string>;  ///< of two parts, sorted
 
-  std::size_t parts = 0;  ///< also those with faults
+  std::size_t parts = 0;  ///< including those with faults
   std::vector<std::string> names;
   std::span<const Clash> pairs;
-  double tolerance = -1;                                    ///< [u³] below 0: not asked for
+  double tolerance = -1;                                    ///< [u³] negative: none requested
   bool swept = false;                                       ///< over several poses
-  std::vector<std::pair<std::string, std::string>> faults;  ///< part, what
+  std::vector<std::pair<std::string, std::string>> faults;  ///< part, fault
   std::vector<std::string> notes;
   bool compared = false;    ///< with an earlier run
   std::set<Names> earlier;  ///< its clashes
@@ -91,7 +91,7 @@ struct ClashReport {
   Names names_of(const Clash& clash) const;
   /// "certainly above" the tolerance, "certainly below" it, or "undecided".
   const char* verdict(const Clash& clash) const;
-  /// It overlaps, and not certainly below the tolerance.
+  /// True if it overlaps, and not certainly below the tolerance.
   bool is_clash(const Clash& clash) const;
   std::size_t new_clashes() const;
   std::vector<Names> resolved() const;
@@ -100,14 +100,14 @@ struct ClashReport {
 nlohmann::ordered_json clashes_json(const ClashReport& report);  ///< docs/json.md
 std::string clashes_csv(const ClashReport& report);
 std::string clashes_text(const ClashReport& report);
-/// With five digits, and a tenth of a unit however far from the origin.
+/// With five digits, but to a tenth of a unit however far from the origin.
 std::string place_text(const Eigen::Vector3d& x);
 
-/// The clashes of a report of `ist clash --json`. Throws Error where the file is none.
+/// The clashes of a report of `ist clash --json`. Throws Error for other files.
 std::set<ClashReport::Names> read_clashes(const std::string& path);
 
-/// A zip of the BIM Collaboration Format 2.1: a topic a clash, with a viewpoint. A pair of names
-/// has the same topic in every run. `date`: ISO 8601.
+/// A zip of the BIM Collaboration Format 2.1: one topic per clash, with a viewpoint. A pair of
+/// names has the same topic in every run. `date`: ISO 8601.
 std::string clashes_bcf(const ClashReport& report, const std::string& date);
 
 const char* name_of(ClashKind kind) noexcept;

@@ -49,7 +49,7 @@ std::vector<ClashReport::Names> ClashReport::resolved() const {
   std::set<Names> left = earlier;
   for (const Clash& clash : pairs)
     if (is_clash(clash)) left.erase(names_of(clash));
-  for (const auto& fault : faults)  // nothing is known of its pairs
+  for (const auto& fault : faults)  // its pairs are unknown
     std::erase_if(left, [&](const Names& pair) {
       return pair.first == fault.first || pair.second == fault.first;
     });

@@ -98,7 +98,7 @@ class TomlReader {
     return out;
   }
 
-  /// A path in the folder of this file; the file is there.
+  /// A path in the folder of this file; the file must exist.
   std::string file(const toml::node& node, const std::string& key) const {
     const std::string path = (folder_ / text(node, key)).lexically_normal().string();
     std::error_code none;
@@ -195,7 +195,8 @@ void read_clash_scene(const std::string& path, ClashSource& out) {
   MeshScene scene = read_mesh_scene(path);
   out.notes = scene.notes;
   const auto meshes = std::make_shared<std::vector<TriangleMesh>>(std::move(scene.meshes));
-  std::map<std::vector<double>, std::size_t> shapes;  // by mesh and what a pose cannot do
+  std::map<std::vector<double>, std::size_t>
+      shapes;  // by mesh, and the part of the transform that is not a pose
   std::map<std::string, int> taken;
   for (MeshScene::Part& part : scene.parts) {
     if ((*meshes)[part.mesh].triangles.empty()) {
@@ -207,7 +208,7 @@ void read_clash_scene(const std::string& path, ClashSource& out) {
           fmt::format("{} has the scale 0, which hides it: it is no part", part.name));
       continue;
     }
-    // A rotation, after a mirror image where it must be, and one scale; else the mesh is deformed.
+    // A rotation, after a mirror image if necessary, and one scale; otherwise the mesh is deformed.
     Eigen::Matrix3d linear = part.in_world.linear(), deformed = Eigen::Matrix3d::Identity();
     if (linear.determinant() < 0) deformed(0, 0) = -1;
     linear = linear * deformed;

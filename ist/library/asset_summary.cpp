@@ -16,19 +16,19 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kCoarse = 0.4;  // covered by inner spheres: less says that walls are thinner
+constexpr double kCoarse = 0.4;  // coverage by inner spheres; less means that walls are thinner
 constexpr double kEnough = 0.5;
-/// Spheres needed from where an asset stops, in those of its last size: measured on a plate with
-/// holes (tray_perforated.stl) of 100 to 8,000 spheres.
-constexpr double kRoom = 1.9;
+/// Additional spheres needed, relative to their last size: measured on a plate with holes
+/// (tray_perforated.stl) with 100 to 8,000 spheres.
+constexpr double kExtraSpheres = 1.9;
 
-/// With two digits, upwards.
+/// Rounds up to two digits.
 std::uint64_t round_count(double count) {
   const double unit = std::pow(10.0, std::max(0.0, std::floor(std::log10(count)) - 1));
   return static_cast<std::uint64_t>(std::ceil(count / unit) * unit);
 }
 
-/// Whether the mode knows the largest sphere that would fit; the header of others says 1.
+/// True if the mode knows the largest sphere that would fit; the header of others contains 1.
 bool keeps_bound(GridMode mode) { return mode == GridMode::banded; }
 
 /// Keys of JSON for kOverlapClassNames, in ASCII.
@@ -46,7 +46,7 @@ Json tree_json(const TreeHeader& tree, double scale) {
           {"overlap", tree.overlap}};
 }
 
-/// Empty where nothing was predicted.
+/// Empty without a prediction.
 Json predicted_json(const AssetHeader& h) {
   Json result = Json::object();
   if (h.predicted_poses == 0) return result;
@@ -80,7 +80,7 @@ const char* why_missed(StopReason stop) {
                         "the time limit ended the search", kCount, "no more spheres fit"});
 }
 
-/// The file ends with the mesh.
+/// The mesh is the last section of the file.
 std::uint64_t mesh_bytes(const AssetHeader& h) { return h.mesh == 0 ? 0 : h.file_bytes - h.mesh; }
 
 Json mesh_json(const AssetView& tree) {
@@ -143,7 +143,7 @@ Json details_json(const AssetHeader& h, double scale) {
 std::optional<std::uint64_t> enough_spheres(const AssetView& tree) {
   const AssetHeader& h = tree.header();
   if (!(h.coverage < kCoarse) || !(h.volume > 0)) return std::nullopt;
-  // The last quarter: what one of its spheres covers of the solid.
+  // The last quarter: the volume of the solid that one of its spheres covers.
   const Sphere* const spheres = at<Sphere>(h, h.inner_spheres);
   const std::uint64_t from = h.sphere_count - (h.sphere_count + 3) / 4;
   double covered = 0;
@@ -153,7 +153,8 @@ std::optional<std::uint64_t> enough_spheres(const AssetView& tree) {
   }
   const double each = covered / static_cast<double>(h.sphere_count - from);
   if (!(each > 0)) return std::nullopt;
-  const double count = static_cast<double>(h.sphere_count) + kRoom * (kEnough - h.coverage) / each;
+  const double count =
+      static_cast<double>(h.sphere_count) + kExtraSpheres * (kEnough - h.coverage) / each;
   if (!(count <= static_cast<double>(kMaxSpheres))) return std::nullopt;
   return round_count(count);
 }

@@ -27,7 +27,7 @@ class Hash {
   Hash() { XXH3_128bits_reset(&state_); }
 
   void add(const void* bytes, std::size_t count) { XXH3_128bits_update(&state_, bytes, count); }
-  /// With its length, so that two texts are not one after the other.
+  /// Adds the length too, so that the concatenation of two texts is unambiguous.
   void add_text(std::string_view text) {
     const std::uint64_t size = text.size();
     add(&size, sizeof(size));
@@ -63,7 +63,7 @@ class Hash {
   XXH3_state_t state_;
 };
 
-/// A mesh of a format whose files we do not know counts by what it is loaded as.
+/// A mesh of an unknown format is hashed by its loaded data.
 void add_loaded(const std::string& path, Hash& hash) {
   const TriangleMesh mesh = load_mesh(path);
   std::vector<double> coordinates;
@@ -78,7 +78,7 @@ namespace fs = std::filesystem;
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kEntryFormat = 3;  ///< entries of others are not found
+constexpr int kEntryFormat = 3;  ///< entries of other formats are ignored
 
 /// The hash of a line's other fields and of the asset.
 std::string hash_of(const Json& line, const Asset& asset) {
@@ -102,7 +102,7 @@ std::optional<std::string> read_file(const fs::path& path) {
 constexpr std::size_t kKeyDigits = 32;
 constexpr std::string_view kEnding = ".entry";
 
-/// A file of the cache, by its name alone.
+/// The kind of a file of the cache, by its name alone.
 enum class Kind { other, entry, left_over };
 Kind kind_of(const std::string& name) {
   constexpr std::size_t kWhole = kKeyDigits + kEnding.size();
@@ -123,7 +123,7 @@ struct CacheFile {
   double unused;  ///< [s]
 };
 
-/// Files that others remove meanwhile are passed over.
+/// Skips files that other processes remove meanwhile.
 std::vector<CacheFile> files_of(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
@@ -173,7 +173,7 @@ CacheKey cache_key(const Job& job) {
     add_loaded(job.mesh, hash);
     return hash.key();
   }
-  // Its ending says how a file is read.
+  // The extension determines how a file is read.
   hash.add_text(ending_of(job.mesh));
   for (const std::string& file : *files) hash.add_file(file);
   return hash.key();
@@ -222,7 +222,7 @@ std::optional<CacheEntry> AssetCache::find(const CacheKey& key, std::string& dam
     CacheEntry entry =
         entry_from(std::string_view(*bytes).substr(0, line), key,
                    Asset(std::as_bytes(std::span(*bytes)).subspan(line + 1), "the asset"));
-    utimensat(AT_FDCWD, path.c_str(), nullptr, 0);  // a cache that may only be read is one too
+    utimensat(AT_FDCWD, path.c_str(), nullptr, 0);  // ignores failure: the cache may be read-only
     return entry;
   } catch (const std::exception& error) {
     damage = fmt::format("{}: {}", path.string(), error.what());
@@ -239,7 +239,7 @@ void AssetCache::store(const CacheKey& key, const CacheEntry& entry) {
   fs::create_directory(path.parent_path(), error);
   write_atomically(path, bytes);
 
-  constexpr std::uint64_t kShare = 16;  // of the limit: by so much it may be passed
+  constexpr std::uint64_t kShare = 16;  // of the limit: it may be exceeded by this share
   if (limit_ == 0) return;
   if (stored_.fetch_add(bytes.size()) + bytes.size() <= limit_ / kShare) return;
   stored_ = 0;
@@ -263,7 +263,7 @@ CacheUse look_at_cache(const fs::path& folder) {
 }
 
 Pruned prune_cache(const fs::path& folder, std::optional<std::uint64_t> most) {
-  constexpr double kAbandoned = 3600;  // [s] no file is written for so long
+  constexpr double kAbandoned = 3600;  // [s] a file written to longer ago is abandoned
   std::vector<CacheFile> files = files_of(folder);
   std::sort(files.begin(), files.end(),
             [](const CacheFile& a, const CacheFile& b) { return a.unused > b.unused; });
@@ -277,7 +277,7 @@ Pruned prune_cache(const fs::path& folder, std::optional<std::uint64_t> most) {
     const bool removed = fs::remove(file.path, error);
     if (error) continue;
     if (is_entry) bytes -= file.bytes;
-    if (!removed) continue;  // by another, meanwhile
+    if (!removed) continue;  // another process removed it
     ++pruned.entries;
     pruned.bytes += file.bytes;
   }

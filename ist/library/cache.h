@@ -7,11 +7,11 @@
 
 #include "library/job.h"
 
-// A folder of assets by what they were baked from. Any number of processes and hosts may share it,
-// and any of them may die at any moment: an entry is a file that has its name only once it is whole
-// and on the disk, nothing is locked, and what is read is held against its hash.
+// A folder of assets, keyed by their inputs. Any number of processes and hosts may share it, and
+// any of them may die at any moment: an entry gets its name only after it is completely on disk,
+// nothing is locked, and everything read is verified by its hash.
 //
-//   DIR/ab/abcdef….entry   the entry of the key abcdef…: its line, and after that the asset
+//   DIR/ab/abcdef….entry   the entry of the key abcdef…: its line, followed by the asset
 
 namespace ist {
 
@@ -31,27 +31,27 @@ CacheKey cache_key(const Job& job);
 struct CacheEntry {
   Asset asset;
   std::vector<std::string> notes;         ///< MeshReport::notes of the mesh
-  std::optional<double> confidence = {};  ///< RepairQuality's, of a mesh that was not closed
+  std::optional<double> confidence = {};  ///< RepairQuality's, for a mesh that was open
 };
 
 /// An entry without its asset as a line of JSON: key, notes, confidence; a hash of these and the
 /// asset.
 std::string line_of(const CacheKey& key, const CacheEntry& entry);
-/// The entry of such a line. Throws an exception that says what is wrong where the line is damaged,
-/// or is another key's or another asset's.
+/// Parses such a line. Throws an exception that describes the fault if the line is damaged, or
+/// belongs to another key or asset.
 CacheEntry entry_from(std::string_view line, const CacheKey& key, Asset asset);
 
 class AssetCache {
  public:
-  /// `limit` [bytes]: as storing goes on, entries that were not used for longest are removed; 0:
-  /// none are. Makes the folder; throws Error where that cannot be.
+  /// `limit` [bytes]: storing removes the least recently used entries beyond it; 0: none. Creates
+  /// the folder; throws Error if that fails.
   explicit AssetCache(std::filesystem::path folder, std::uint64_t limit = 0);
 
-  /// Nothing where there is no such entry or it is damaged, as `damage` says. Marks it used.
-  /// Thread-safe.
+  /// Nothing if there is no such entry, or if it is damaged (then `damage` describes it). Marks it
+  /// as used. Thread-safe.
   std::optional<CacheEntry> find(const CacheKey& key, std::string& damage) const;
 
-  /// In place of an entry that may be there. Throws Error. From any thread.
+  /// Replaces an existing entry. Throws Error. Thread-safe.
   void store(const CacheKey& key, const CacheEntry& entry);
 
  private:
@@ -59,30 +59,30 @@ class AssetCache {
 
   const std::filesystem::path folder_;
   const std::uint64_t limit_;
-  std::atomic<std::uint64_t> stored_ = 0;  ///< [bytes] since the limit was last looked after
+  std::atomic<std::uint64_t> stored_ = 0;  ///< [bytes] since the limit was last checked
 };
 
 struct CacheUse {
   std::uint64_t entries = 0, bytes = 0;
-  std::uint64_t left_over = 0, left_over_bytes = 0;  ///< files that a killed program left
-  double oldest = 0, newest = 0;                     ///< [s] ago, when entries were last used
+  std::uint64_t left_over = 0, left_over_bytes = 0;  ///< files left by a killed program
+  double oldest = 0, newest = 0;  ///< [s] since the least and the most recent use
 };
 
-/// Throws Error where there is no such folder.
+/// Throws Error if there is no such folder.
 CacheUse look_at_cache(const std::filesystem::path& folder);
 
 struct Pruned {
   std::uint64_t entries = 0, bytes = 0;  ///< removed
 };
 
-/// Removes what a killed program left an hour ago or more, and, until `most` bytes are left, the
-/// entries that were not used for longest; files that are no cache's stay. Throws Error as above.
+/// Removes files that a killed program left an hour ago or more, and the least recently used
+/// entries until `most` bytes are left; other files stay. Throws Error as above.
 Pruned prune_cache(const std::filesystem::path& folder, std::optional<std::uint64_t> most);
 
-/// Raise it with every change by which some mesh and settings give other bytes than before: older
-/// entries of a cache are then skipped.
-/// The tests compare the hash below with that of tests/soak/bake_hashes.csv, whose hashes of assets
-/// change then too: after writing new ones there, raise the one and copy the other.
+/// Raise this with every change by which some mesh and settings give other bytes than before: then
+/// older entries of a cache are skipped. The tests compare the hash below with that of
+/// tests/soak/bake_hashes.csv, whose hashes of assets change too: after writing new ones there,
+/// raise the revision and copy the hash.
 inline constexpr std::uint32_t kBakeRevision = 9;
 inline constexpr std::uint64_t kBakeHashesOfRevision = 1833951002004931908u;
 

@@ -8,9 +8,9 @@
 
 namespace ist {
 
-/// Rows of comma-separated text (RFC 4180): a field in quotes may hold commas, line breaks and
-/// doubled quotes; others lose the blanks around them. Rows without anything are passed over, and
-/// so is the mark of UTF-8 that Excel writes.
+/// Rows of comma-separated text (RFC 4180): a quoted field may contain commas, line breaks and
+/// doubled quotes; other fields lose surrounding blanks. Skips empty rows, and the UTF-8 mark that
+/// Excel writes.
 class CsvReader {
  public:
   /// `name`: of the file, for messages.
@@ -41,7 +41,7 @@ class CsvReader {
     return true;
   }
 
-  /// The field that begins at `at`, which is left on the comma or the line's end after it.
+  /// Reads the field at `at`, and moves `at` to the following comma or line end.
   std::string field(std::size_t& at) {
     const std::size_t first = line_.find_first_not_of(kBlank, at);
     if (first != std::string::npos && line_[first] == '"') {

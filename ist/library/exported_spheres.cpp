@@ -16,11 +16,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Moved {
   Eigen::Vector3d centre;
-  double error;  ///< [u] the exact centre lies no further from `centre`
+  double error;  ///< [u] bound on the distance of the exact centre from `centre`
 };
 
-/// x · scale + origin. The product is exact (a power of two); what the sum rounds away is found by
-/// Knuth's two-sum, which is exact again.
+/// x · scale + origin. The product is exact (a power of two); Knuth's two-sum gives the exact
+/// rounding error of the sum.
 Moved to_mesh_frame(const Sphere& s, const double origin[3], double scale) {
   const double unit[3] = {s.x, s.y, s.z};
   Moved moved{Eigen::Vector3d::Zero(), 0};
@@ -70,7 +70,7 @@ std::vector<ExportedSphere> exported_spheres(const AssetView& tree, std::uint32_
     const double radius = inner[i].r * scale, cover_radius = cover[i] * scale;
     ExportedSphere& s = result[i];
     s.centre = moved.centre;
-    // Where the sum was exact the radii are exact; elsewhere they make up for the moved centre.
+    // If the sum was exact, so are the radii; otherwise they compensate for the moved centre.
     s.radius =
         moved.error == 0 ? radius : std::max(0.0, std::nextafter(radius - moved.error, -kInfinity));
     s.cover_radius =

@@ -15,8 +15,8 @@ struct ExportedSphere {
   double cover_radius = 0;         ///< [u] about `centre`, rounded up
 };
 
-/// Those of a detail in [0, header().detail_count]: the first of the inner spheres, with the
-/// matched spheres that stand for them.
+/// The spheres of a detail in [0, header().detail_count]: the first of the inner spheres, with the
+/// matched spheres that replace them.
 std::vector<ExportedSphere> exported_spheres(const AssetView& tree, std::uint32_t detail);
 
 // Text of a whole file: columns x,y,z,r,ex,ey,ez,er,c, 17 digits.

@@ -21,7 +21,7 @@ class Search {
   std::vector<fs::path> run(const fs::path& root) {
     enter(root, 0);
     for (fs::path& path : found_) path = path.lexically_normal();
-    // ** before a name may reach a file more than once.
+    // With ** before a name, a file may be found more than once.
     std::sort(found_.begin(), found_.end());
     found_.erase(std::unique(found_.begin(), found_.end()), found_.end());
     return std::move(found_);

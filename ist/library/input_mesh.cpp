@@ -8,7 +8,7 @@ namespace ist {
 void place(TriangleMesh& mesh, const MeshSettings& settings) {
   scale_mesh(mesh, settings.scale);
   if (settings.up_axis == 0 || settings.up_axis == settings.world_up) return;
-  // Coordinates change places and signs: no digit is lost.
+  // Coordinates are permuted and negated: no digit is lost.
   const int from = settings.up_axis - 'X', to = settings.world_up - 'X';
   for (Eigen::Vector3d& v : mesh.vertices) {
     const double up = v[from];

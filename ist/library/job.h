@@ -5,17 +5,17 @@
 
 namespace ist {
 
-/// Requirements without which an asset fails. They do not change its bytes.
+/// Requirements for an asset; a bake that violates them fails. They do not change its bytes.
 struct Demands {
   bool mesh = false;      ///< it contains its mesh, for exact queries
   double coverage = 0;    ///< at least; share of the solid's volume
-  double confidence = 0;  ///< at least; of a mesh that had to be closed
+  double confidence = 0;  ///< at least; of a mesh that was open
 };
 
 struct Job {
   std::string name;                           ///< of the asset: NAME.ist
   std::string mesh;                           ///< path
-  std::optional<PlacedLinkShape> shape = {};  ///< of a robot's link: that mesh in the link's frame
+  std::optional<PlacedLinkShape> shape = {};  ///< of a robot's link: the mesh in the link's frame
   std::string urdf = {};                      ///< the robot's, for messages
   BakeSettings settings;
   Demands demands;
@@ -24,8 +24,8 @@ struct Job {
 enum class JobStatus {
   baked,      ///< and written
   cached,     ///< taken from the cache
-  failed,     ///< `message` says why; nothing was written
-  not_baked,  ///< the run was interrupted before or meanwhile; nothing was written
+  failed,     ///< `message` gives the reason; nothing was written
+  not_baked,  ///< the run was interrupted before or during it; nothing was written
 };
 const char* name_of(JobStatus status) noexcept;
 
@@ -41,13 +41,13 @@ struct JobResult {
   std::string content_hash;  ///< AssetHeader's, in 16 digits
   std::uint64_t bytes = 0, spheres = 0;
   double coverage = 0;                             ///< share of the solid's volume
-  double volume = 0, protrusion = 0;               ///< as AssetView has them
+  double volume = 0, protrusion = 0;               ///< as in AssetView
   std::string mesh_state;                          ///< name_of(AssetView::mesh_state())
   std::uint64_t mesh_triangles = 0;                ///< kept for exact queries
-  double mesh_error = 0, self_overlap_volume = 0;  ///< as AssetView has them
-  std::optional<double> target_error, error;  ///< asked for and measured, relative; see ErrorTarget
+  double mesh_error = 0, self_overlap_volume = 0;  ///< as in AssetView
+  std::optional<double> target_error, error;  ///< requested and measured, relative; see ErrorTarget
   std::optional<bool> target_met;
-  std::optional<double> confidence;  ///< RepairQuality's, of a mesh that was repaired or wrapped
+  std::optional<double> confidence;  ///< RepairQuality's, for a mesh that was repaired or wrapped
 
   bool done() const { return status == JobStatus::baked || status == JobStatus::cached; }
 };

@@ -34,7 +34,7 @@ std::uint64_t machine_memory() {
          static_cast<std::uint64_t>(std::max(page, 0L));
 }
 
-/// The memory that a control group of version 1 or 2, or one above it, leaves.
+/// The memory available in a control group of version 1 or 2, and in those above it.
 std::uint64_t group_memory() {
   std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
   std::ifstream groups("/proc/self/cgroup");
@@ -63,12 +63,12 @@ std::uint64_t size_of(const std::string& path) {
   return none ? 0 : size;
 }
 
-// Measured over meshes of 10,000 to 871,000 triangles and 1,000 to 50,000 spheres: at most so much.
+// Upper bounds, measured over meshes of 10,000 to 871,000 triangles and 1,000 to 50,000 spheres.
 constexpr std::uint64_t kFixed = 48 << 20;
 constexpr std::uint64_t kPerTriangle = 600;
 constexpr std::uint64_t kPerSphere = 20'000;
 
-/// The fewest bytes of a file that a triangle takes.
+/// The minimum size of a triangle in a file [bytes].
 std::uint64_t bytes_of_triangle(const std::string& path) {
   const std::string ending = ending_of(path);
   if (ending == ".stl") return 50;
@@ -82,11 +82,11 @@ std::uint64_t available_memory() { return std::min(machine_memory(), group_memor
 
 std::uint64_t memory_of(const Job& job) {
   std::uint64_t size = size_of(job.mesh);
-  if (job.mesh.ends_with(".gltf")) {  // its numbers stand beside it
+  if (job.mesh.ends_with(".gltf")) {  // its numbers are in files beside it
     try {
       const auto files = files_of_mesh(job.mesh);
       for (std::size_t i = 1; files && i < files->size(); ++i) size += size_of((*files)[i]);
-    } catch (const Error&) {  // baking will say why
+    } catch (const Error&) {  // baking will report the reason
     }
   }
   const std::uint64_t spheres =
@@ -121,7 +121,7 @@ void GpuPlaces::give_back(int gpu) {
 
 JobQueue::JobQueue(std::vector<std::uint64_t> needs, std::uint64_t memory)
     : needs_(std::move(needs)), memory_(memory), waiting_(needs_.size()) {
-  // From the back, so that jobs of one size are handed out in their order.
+  // Reversed, so that jobs of equal size are handed out in order.
   std::iota(waiting_.rbegin(), waiting_.rend(), std::size_t{0});
   std::stable_sort(waiting_.begin(), waiting_.end(),
                    [&](std::size_t a, std::size_t b) { return needs_[a] < needs_[b]; });
@@ -134,9 +134,9 @@ std::optional<std::size_t> JobQueue::take() {
     const std::uint64_t left = memory_ - std::min(used_, memory_);
     auto best = waiting_.end();
     if (running_ != 0)
-      best =
-          std::upper_bound(waiting_.begin(), waiting_.end(), left,
-                           [&](std::uint64_t room, std::size_t job) { return room < needs_[job]; });
+      best = std::upper_bound(
+          waiting_.begin(), waiting_.end(), left,
+          [&](std::uint64_t available, std::size_t job) { return available < needs_[job]; });
     if (best != waiting_.begin()) {
       const std::size_t job = *--best;
       waiting_.erase(best);

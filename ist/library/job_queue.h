@@ -8,22 +8,22 @@
 
 namespace ist {
 
-/// [bytes] that this process may still take: of the machine, and of the control groups it is in.
+/// [bytes] still available to this process, from the machine and from its control groups.
 std::uint64_t available_memory();
 
-/// [bytes] that a job takes at most, by its mesh file's size and sphere count: a safe guess.
+/// [bytes] Upper estimate of a job's memory, from its mesh file's size and sphere count.
 std::uint64_t memory_of(const Job& job);
 
-/// Places for bakes on the GPUs of this machine. For many threads.
+/// Slots for bakes on the GPUs of this machine. Thread-safe.
 class GpuPlaces {
  public:
   GpuPlaces(int gpus, int on_each)
       : places_(static_cast<std::size_t>(gpus * on_each)),
         free_(static_cast<std::size_t>(gpus), on_each) {}
 
-  std::size_t places() const { return places_; }  ///< free and taken; 0: no GPU
+  std::size_t places() const { return places_; }  ///< free and used; 0: no GPU
 
-  /// A place on the GPU with the most free ones; waits for one.
+  /// A slot on the GPU with the most free slots; waits for one.
   class Place {
    public:
     explicit Place(GpuPlaces& places) : places_(places), gpu_(places.take()) {}
@@ -32,7 +32,7 @@ class GpuPlaces {
     Place& operator=(const Place&) = delete;
     int gpu() const { return gpu_; }
 
-    /// Gives the place back for a while, or waits for one on the same GPU again.
+    /// Releases the slot temporarily, or waits for one on the same GPU again.
     void hold(bool wanted) {
       if (wanted == held_) return;
       wanted ? places_.take_on(gpu_) : places_.give_back(gpu_);
@@ -56,18 +56,18 @@ class GpuPlaces {
   std::vector<int> free_;  ///< places, by GPU
 };
 
-/// Hands out jobs, the largest first, as memory allows. For many threads.
+/// Hands out jobs, the largest first, as memory allows. Thread-safe.
 class JobQueue {
  public:
-  /// `needs` [bytes] of each job; `memory` [bytes] of all that run at once.
+  /// `needs` [bytes] of each job; `memory` [bytes] of all running jobs.
   JobQueue(std::vector<std::uint64_t> needs, std::uint64_t memory);
 
-  /// The largest of those that fit beside what runs, or the largest of all where nothing runs.
-  /// Waits for others to end where none fits. Nothing: there are no more.
+  /// The largest job that fits beside the running ones, or the largest of all if none runs. Waits
+  /// for others to end if none fits. Nothing: there are no more jobs.
   std::optional<std::size_t> take();
 
-  void give_back(std::size_t job);  ///< what take() gave, once it has ended
-  void close();                     ///< no more are handed out
+  void give_back(std::size_t job);  ///< a job from take(), once it has ended
+  void close();                     ///< stops handing out jobs
   std::size_t waiting();            ///< jobs not taken yet
 
  private:

@@ -22,10 +22,10 @@ namespace {
 namespace fs = std::filesystem;
 using Line = toml::source_index;
 
-/// Keys that no bake has: what the asset must be.
+/// Keys that are not settings of a bake: requirements for the asset.
 constexpr std::string_view kDemands[] = {"require-mesh", "min-coverage", "min-confidence"};
 
-/// Which files, and what assets of them are called.
+/// Keys that select files and name their assets.
 bool is_file_key(std::string_view key) {
   return key == "mesh" || key == "name" || key == "exclude";
 }
@@ -36,7 +36,7 @@ const Setting* setting_named(std::string_view name) {
   return nullptr;
 }
 
-/// "; did you mean 'spheres'?", or all there are.
+/// "; did you mean 'spheres'?", or all known keys.
 std::string other_keys(std::string key, std::vector<std::string> known) {
   std::replace(key.begin(), key.end(), '_', '-');
   for (const Setting& setting : all_settings()) known.push_back(setting.name);
@@ -46,7 +46,7 @@ std::string other_keys(std::string key, std::vector<std::string> known) {
   return fmt::format("known keys are {}", fmt::join(known, ", "));
 }
 
-/// A value as the command line would have it; nothing for a type that it cannot be.
+/// A value in the syntax of the command line; nothing for a type that is not allowed.
 std::optional<std::string> text_of(const toml::node& value, SettingKind kind) {
   const bool factors = kind == SettingKind::factors;
   const bool number = kind == SettingKind::real || kind == SettingKind::share ||
@@ -84,7 +84,7 @@ std::string shown(const toml::node& value) {
   return text.str();
 }
 
-/// Settings given somewhere, and in which lines.
+/// Settings given in some place, with their lines.
 struct Given {
   Demands demands;
   std::map<std::string, Line> lines;
@@ -120,7 +120,7 @@ class Reader {
                 : fmt::format("unknown '{}': did you mean '{}'?", name, nearest));
     }
     read_defaults(root);
-    // Where a table's name is unknown, that is the one mistake.
+    // If a table's name is unknown, that is the only mistake.
     if (all_known && !root.contains("asset") && !root.contains("robot"))
       fault(1, "no [[asset]]: add at least one");
     read_entries(root, "asset", &Reader::read_asset);
@@ -167,7 +167,7 @@ class Reader {
     }
   }
 
-  /// False: the key is no demand.
+  /// Returns false if the key is not a requirement.
   bool read_demand(const toml::key& key, const toml::node& value, Demands& demands) {
     const std::string name(key.str());
     if (std::find(std::begin(kDemands), std::end(kDemands), name) == std::end(kDemands))
@@ -221,7 +221,7 @@ class Reader {
     }
   }
 
-  /// "text" or ["text", …]; a fault, where it is neither.
+  /// Reads "text" or ["text", …]; records a fault otherwise.
   std::vector<std::string> texts_of(std::string_view key, const toml::node& value) {
     std::vector<std::string> texts;
     const auto take = [&](const toml::node& one) {
@@ -299,7 +299,7 @@ class Reader {
     }
   }
 
-  /// A key that must be text; nothing, and perhaps a fault, where it is not.
+  /// Reads a key that must be text; nothing, and perhaps a fault, otherwise.
   std::optional<std::string> text_at(const toml::table& table, const char* key) {
     const toml::node* const node = table.get(key);
     if (node == nullptr) return std::nullopt;
@@ -344,7 +344,7 @@ class Reader {
     }
   }
 
-  /// Takes out the files that patterns match; one that matches none is a warning.
+  /// Removes the files that patterns match; a pattern that matches none gives a warning.
   void exclude(const toml::node& node, const std::string& mesh, std::vector<std::string>& files) {
     for (const std::string& pattern : texts_of("exclude", node)) {
       const bool absolute = fs::path(pattern).is_absolute();
@@ -380,7 +380,7 @@ class Reader {
               in_own == own.lines.end() ? fmt::format(" (in the asset of line {})", line) : ""));
   }
 
-  /// The files that a path or pattern names; none, and a fault, where that is wrong.
+  /// The files that a path or pattern names; none, and a fault, if it is invalid.
   std::vector<std::string> files_for(const std::string& mesh, Line line) {
     std::error_code none;
     const fs::path path = (folder_ / mesh).lexically_normal();
@@ -427,7 +427,7 @@ class Reader {
   void add(const Job& job, Line line) {
     const bool control = std::any_of(job.name.begin(), job.name.end(),
                                      [](char c) { return static_cast<unsigned char>(c) < ' '; });
-    constexpr std::size_t kLongest = 200;  // file systems take 255, less what is appended
+    constexpr std::size_t kLongest = 200;  // file systems allow 255, including what is appended
     if (job.name.empty() || job.name.starts_with('.') || control || job.name.size() > kLongest ||
         job.name.find('/') != std::string::npos)
       return fault(line, fmt::format("name: '{}' is not a valid file name: use at most {} bytes, "

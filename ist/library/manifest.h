@@ -5,15 +5,15 @@
 
 namespace ist {
 
-/// A library of assets as a TOML file describes it (docs/library.md).
+/// A library of assets described by a TOML file (docs/library.md).
 struct Manifest {
-  std::vector<Job> jobs;              ///< by name, sorted; complete where there are no faults
-  std::vector<RobotAssets> robots;    ///< whose assets are among the jobs
-  std::vector<std::string> faults;    ///< "scene.toml:12: …": all that can be told without baking
-  std::vector<std::string> warnings;  ///< alike: what is probably not meant
+  std::vector<Job> jobs;            ///< sorted by name; complete if there are no faults
+  std::vector<RobotAssets> robots;  ///< whose assets are among the jobs
+  std::vector<std::string> faults;  ///< "scene.toml:12: …": all that can be found without baking
+  std::vector<std::string> warnings;  ///< in the same form: probable mistakes
 };
 
-/// Paths in it are relative to its folder. Throws Error where it cannot be read.
+/// Paths in it are relative to its folder. Throws Error if it cannot be read.
 Manifest read_manifest(const std::string& path);
 
 }  // namespace ist

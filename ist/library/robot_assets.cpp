@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The description of a primitive, as parse_field() takes it.
+/// The description of a primitive, in the syntax of parse_field().
 std::string field_spec_of(const LinkShape& shape) {
   if (const auto* box = std::get_if<LinkBox>(&shape))
     return fmt::format("box:{:.17g},{:.17g},{:.17g}", box->half_extents.x(), box->half_extents.y(),

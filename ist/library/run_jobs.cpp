@@ -32,7 +32,7 @@ using BakeMesh = std::function<Asset(const ClosedMesh&, const BakeSettings&)>;
 
 namespace fs = std::filesystem;
 
-/// Nothing is written where the very bytes stand already.
+/// Does not write if the file already has these bytes.
 void write_asset(const fs::path& path, const Asset& asset) {
   std::error_code none;
   if (fs::file_size(path, none) == asset.bytes().size() && !none) {
@@ -46,7 +46,7 @@ void write_asset(const fs::path& path, const Asset& asset) {
   asset.save(path);
 }
 
-/// Another run, on a machine with more time, would give another asset.
+/// True if a machine with more time would give another asset.
 bool was_out_of_time(const AssetView& tree) {
   const AssetHeader& h = tree.header();
   const auto late = static_cast<std::uint32_t>(StopReason::time_limit);
@@ -88,7 +88,7 @@ CacheEntry bake_entry(const Job& job, const BakeMesh& bake) {
   return entry;
 }
 
-/// Throws Error where an asset is not what its manifest demands.
+/// Throws Error if an asset does not meet the manifest's requirements.
 void check_demands(const Job& job, const CacheEntry& entry) {
   const AssetView& tree = entry.asset.view();
   const Demands& demands = job.demands;
@@ -109,8 +109,8 @@ void check_demands(const Job& job, const CacheEntry& entry) {
                     job.mesh, *entry.confidence, demands.confidence));
 }
 
-/// From the mesh's file to the asset's, or from the cache. `bake` is called where it is not in
-/// there. Throws whatever goes wrong; what cannot be kept in the cache is a warning.
+/// Makes an asset from a mesh's file, or takes it from the cache; `bake` is called if it is not
+/// there. Throws on any error, but failing to store in the cache is only a warning.
 JobResult do_job(const Job& job, const RunSettings& settings, const BakeMesh& bake) {
   JobResult result;
   result.name = job.name;
@@ -152,11 +152,11 @@ JobResult do_job(const Job& job, const RunSettings& settings, const BakeMesh& ba
 
 using Clock = std::chrono::steady_clock;
 
-/// Bakes that have work for a GPU at once: what one leaves of it while it waits for the host,
-/// others take. Their host threads are mostly idle.
+/// The number of concurrent bakes on a GPU: while one waits for the host, others use the GPU. Their
+/// host threads are mostly idle.
 constexpr int kBakesOnGpu = 3;
 
-/// Whether a bake has work for its GPU, by the stage that it reports.
+/// True if a bake has work for its GPU in the stage that it reports.
 bool is_of_gpu(const Progress& progress) {
   const std::string_view stage = progress.stage;
   return stage == "pack" || stage == "calibrate" || stage == "cover";
@@ -176,12 +176,12 @@ std::vector<std::uint64_t> needs_of(const std::vector<Job>& jobs) {
   return needs;
 }
 
-/// Available memory is an estimate, and so are the needs.
+/// A margin: both available memory and the needs are estimates.
 std::uint64_t most_of_memory() { return available_memory() / 10 * 8; }
 
 unsigned all_cores() { return static_cast<unsigned>(oneapi::tbb::info::default_concurrency()); }
 
-/// All that threads share; it lives as long as the last of them.
+/// The data shared by all threads; it lives as long as the last of them.
 class Run {
  public:
   Run(const std::vector<Job>& jobs, const RunSettings& settings)
@@ -215,7 +215,7 @@ class Run {
     queue_.close();
   }
 
-  /// Waits a little and collects the jobs that ended since the last call; false: no more follow.
+  /// Waits briefly and collects the jobs that ended since the last call; false: no more follow.
   bool wait(std::vector<std::pair<std::size_t, JobResult>>& ended) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, std::chrono::milliseconds(100),
@@ -251,7 +251,7 @@ class Run {
     return result;
   }
 
-  /// Cores are shared by the jobs that run now; the last ones get more of them.
+  /// Running jobs share the cores; the last ones get more of them.
   unsigned threads_of_a_job() {
     const std::size_t sharers = std::clamp<std::size_t>(queue_.waiting() + 1, 1, at_once_);
     return std::max(1u, threads_ / static_cast<unsigned>(sharers));
@@ -273,7 +273,7 @@ class Run {
       return !cancelled_;
     };
     Asset asset = bake_as_asked(mesh, settings, go_on).asset;
-    // A packing that was cancelled ends with what there is.
+    // A cancelled packing returns an incomplete result.
     if (cancelled_) throw Cancelled();
     return asset;
   }
@@ -315,7 +315,7 @@ std::optional<CacheEntry> OutputRecord::find(const std::string& name, const Cach
 }
 
 void OutputRecord::add(const CacheKey& key, const CacheEntry& entry) {
-  // The end of the line comes first: a line that was cut short does not take this one with it.
+  // The line break comes first: a truncated previous line does not corrupt this one.
   const std::string text = '\n' + line_of(key, entry);
   const std::lock_guard lock(mutex_);
   std::ofstream file(folder_ / ".ist-bakes", std::ios::app);

@@ -6,8 +6,8 @@
 
 namespace ist {
 
-/// One of the parts into which a library is split with no word between them: an asset is in the
-/// part that the hash of its name says.
+/// One part of a library that is split without communication: an asset belongs to the part that the
+/// hash of its name selects.
 struct Shard {
   std::uint32_t index = 1, count = 1;  ///< 1 … count
 
@@ -19,8 +19,8 @@ struct Summary {
   std::string manifest;            ///< path
   std::uint64_t library_hash = 0;  ///< of all jobs of the manifest: equal for shards of one library
   Shard shard;
-  double seconds = 0;              ///< wall time; of several shards: their sum
-  std::vector<std::string> stale;  ///< assets in the output folder that no job names; left there
+  double seconds = 0;              ///< wall time; for several shards their sum
+  std::vector<std::string> stale;  ///< assets in the output folder that no job names; they are kept
   std::vector<JobResult> results;  ///< by name, sorted
 
   std::size_t count(JobStatus status) const;
@@ -29,17 +29,17 @@ struct Summary {
 
 std::uint64_t hash_of_library(const std::vector<Job>& jobs);
 
-/// An entry of `assets` of the next.
+/// An entry of `assets` in the JSON below.
 nlohmann::ordered_json to_json(const JobResult& result);
 
-/// docs/json.md describes it. `failed`: only assets that are not done are listed; all are counted.
+/// See docs/json.md. `failed`: only assets that are not done are listed; all are counted.
 nlohmann::ordered_json to_json(const Summary& summary, bool failed = false);
 
-/// Reads what to_json() gave. Throws Error (file, what is wrong).
+/// Reads the output of to_json(). Throws Error (file, fault).
 Summary read_summary(const std::string& path);
 
-/// Shards 1 … n of one library, in any order, as one. Throws Error where one is missing, is there
-/// twice or is of another library.
+/// Merges shards 1 … n of one library, in any order. Throws Error if one is missing, duplicate or
+/// from another library.
 Summary merge(std::vector<Summary> shards);
 
 }  // namespace ist

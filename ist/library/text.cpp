@@ -25,7 +25,7 @@ std::string grouped(std::uint64_t count) {
 }
 
 std::string short_vector(const Eigen::Vector3d& v) {
-  // + 0.0: no minus sign before a zero.
+  // + 0.0 removes the minus sign of a zero.
   return fmt::format("({:.5g}, {:.5g}, {:.5g})", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);
 }
 

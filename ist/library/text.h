@@ -6,14 +6,14 @@
 
 #include "library/settings/bake_settings.h"
 
-// How numbers and names are printed: for people, and as JSON.
+// Prints numbers and names, for people and as JSON.
 
 namespace ist {
 
 /// For files and --json. Names that are not UTF-8 are written with replacement characters.
 std::string json_text(const nlohmann::ordered_json& json, int indent = 2);
 
-/// A field of a CSV, in quotes where it must be.
+/// A field of a CSV, quoted if necessary.
 std::string csv_field(const std::string& text);
 std::string grouped(std::uint64_t count);  ///< 10,000
 std::string short_vector(const Eigen::Vector3d& v);

@@ -9,9 +9,9 @@ namespace {
 
 struct StageShare {
   std::string_view name;
-  double begin;  ///< of a round's time
+  double begin;  ///< as a share of a round's time
 };
-/// Shares of the time of bakes of 1,000 to 10,000 spheres. A stage that is not needed is skipped.
+/// Shares of the time of bakes of 1,000 to 10,000 spheres. Stages that are not needed are skipped.
 constexpr std::array<StageShare, 7> kStages = {{{"polygonise", 0},
                                                 {"resolve", 0.05},
                                                 {"pack", 0.1},
@@ -35,7 +35,7 @@ double WholeProgress::share(const Progress& progress) {
   stage_ = stage;
   const double end = found + 1 == kStages.end() ? 1 : found[1].begin;
   const double of_round = found->begin + (end - found->begin) * progress.fraction;
-  // A round takes half of what is left, as if another followed.
+  // A round takes half of the remaining share, as if another followed.
   return share_ = std::max(share_, begin_ + rest_ * of_round * (rounds_ ? 0.5 : 1));
 }
 

@@ -4,10 +4,10 @@
 
 namespace ist {
 
-/// Where a call of several stages stands as a whole.
+/// The overall progress of a call with several stages.
 class WholeProgress {
  public:
-  /// `rounds`: stages begin again, nobody knows how often, as those of bake_to_error().
+  /// `rounds`: the stages repeat an unknown number of times, as in bake_to_error().
   explicit WholeProgress(bool rounds) : rounds_(rounds) {}
 
   /// [0, 1] of the call's time, an estimate that never falls.
@@ -16,7 +16,7 @@ class WholeProgress {
  private:
   const bool rounds_;
   int stage_ = 0;
-  double begin_ = 0, rest_ = 1;  ///< where this round began, and what it is a part of
+  double begin_ = 0, rest_ = 1;  ///< the share at which this round began, and the remaining share
   double share_ = 0;
 };
 

@@ -22,10 +22,10 @@ constexpr int kDirections = 32;
 constexpr std::uint64_t kName = std::uint64_t{1} << 63;
 
 /// The cosine and sine of 1.1°: faces at a larger angle to the contact's normal do not belong to
-/// it. By spheres, which push aslant where they reach over an edge, the normal is not known so
-/// well: faces may be turned by 8° from it, but by no more than 1.1° from each other.
+/// it. Spheres that protrude over an edge tilt the normal. With spheres, faces may therefore
+/// deviate by 8° from it, but by no more than 1.1° from each other.
 constexpr double kFacing = 0.9998, kTurned = 0.02;
-/// Of 8°: faces between the two angles are those of a round surface.
+/// The cosine and sine of 8°. Faces between the two angles belong to a round surface.
 constexpr double kRound = 0.99, kTurnedRound = 0.141;
 constexpr double kTurnedAgainst = 1e-3;  // [rad] two faces at a larger angle are not coplanar
 /// Faces further than this many depths from the middle of a contact do not belong to it.
@@ -55,7 +55,7 @@ struct SupportPolygon::Hull {
   };
 
   Hull() {
-    // Directions between the axes, along which a box would have two outermost corners.
+    // Directions lie between the axes, since a box has two outermost corners along an axis.
     double u = kHalfCos, v = kHalfSin;
     for (int k = 0; k < kDirections; ++k) {
       direction[k][0] = u;
@@ -436,7 +436,7 @@ ContactPatches contact_points(const PlacedSolid& a, const PlacedSolid& b,
                          to_isometry((by_b ? tree_b : tree_a)->pose).linear(),
                          2 * std::min(radius(tree_a), radius(tree_b)),
                          settings.measure == Measure::exact ? 0 : blur(tree_a) + blur(tree_b));
-  // The side with fewer triangles first: in most contacts it is not flat.
+  // Tests the side with fewer triangles first: in most contacts it is not flat.
   const auto triangles = [](const PlacedAsset* tree) {
     return tree != nullptr ? tree->asset.mesh_triangles() : 0;
   };

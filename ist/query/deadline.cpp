@@ -50,7 +50,7 @@ void Deadline::record(const Penetration& answer, double microseconds) noexcept {
   if (!apart) {
     const bool slow = microseconds > deadline_ && budget_ <= kHigh * kLeast;
     slow_ += ((slow ? 1 : 0) - slow_) / kSlowQueries;
-    // The time of a smaller contact says little about a full budget's, unless it is late.
+    // The time of a small contact does not predict that of a full budget, unless it is late.
     if (2 * pairs >= budget_ || microseconds > deadline_) {
       const double step = std::max(kLastStep, kFirstStep * kHalved / (kHalved + samples_));
       if (samples_ < ~0u) ++samples_;

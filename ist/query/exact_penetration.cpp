@@ -69,7 +69,7 @@ class MeshOverlap : public ExactQuery {
   CrossingEnd end_of(std::uint32_t i, int e) const noexcept {
     return scratch_.crossings.end_of(i, e);
   }
-  double way_of(std::uint32_t i, int e) const noexcept {
+  double share_of_edge(std::uint32_t i, int e) const noexcept {
     return scratch_.crossings.end(e, Crossings::kT)[i];
   }
   exact::Point place_of(std::uint32_t i, int e) const noexcept {
@@ -141,12 +141,11 @@ class MeshOverlap : public ExactQuery {
   PartMemory memory_ = scratch_.part_memory();
 };
 
-/// An overlap, its connected parts and their octants.
 class ExactParts : public OverlapOctants<MeshOverlap> {
  public:
   using OverlapOctants::OverlapOctants;
 
-  /// Divides the result of run(): OverlapParts::divide(). For a kept pair it knows if all is one
+  /// Divides the result of run(): OverlapParts::divide(). A kept pair knows whether all is one
   /// part.
   std::uint32_t divide() noexcept;
 
@@ -261,7 +260,7 @@ Penetration whole_answer(const ExactOverlap& found, const PlacedAsset& a, const 
   return answer;
 }
 
-/// The settings for the spheres' answer, which replaces an exact one that a limit stopped.
+/// The settings for the spheres' answer, which replaces an exact answer that a limit stopped.
 template <class Settings>
 Settings settings_of_spheres(Settings settings) {
   settings.measure = Measure::matched;
@@ -276,7 +275,7 @@ Penetration stopped(const PlacedAsset& a, const PlacedAsset& b, Penetration by_s
   return by_spheres;
 }
 
-/// Writes the kept parts in their order; `kept` becomes the patch.
+/// Writes the kept parts in their order; `kept` becomes the patch's index.
 std::size_t write_parts(std::span<ExactPart> parts, const exact::Point& origin,
                         const RelativePose& pose, std::span<ContactPatch> patches) {
   std::uint32_t count = 0;

@@ -98,8 +98,8 @@ class GapDescent : GapStack {
       if (!wanted(child.gap, child.cover)) continue;
       (open_a ? child.a : child.b) = kWidth * opened.block + lane;
       --(open_a ? child.level_a : child.level_b);
-      // The nearest comes on top. Of balls that overlap it is the one that overlaps most for its
-      // size, as it is the most likely to have spheres that do.
+      // The nearest child comes on top; among balls that overlap, the one that overlaps most for
+      // its size, since its spheres are the most likely to overlap.
       child.order =
           child.gap < 0 ? child.gap / (unit * (double{radii[lane]} + other_radius)) : child.gap;
       add(child);
@@ -174,7 +174,6 @@ bool finds_sphere_around(const SphereTree& tree, const Eigen::Vector3d& point, d
   return false;
 }
 
-/// The inner spheres of two solids.
 class InnerSpheres {
  public:
   InnerSpheres(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose)
@@ -240,7 +239,8 @@ class SurfaceGap {
       KeptPairs& kept = scratch.exact.near.of(settings.pair_id, mesh_a_, mesh_b_, pose.a_from_b);
       question_.kept = &kept;
       const double apart = std::exchange(kept.apart, 0);
-      // Surfaces that cannot have touched since the last step contain what they contained.
+      // If the surfaces cannot have touched since the last step, no solid has come to contain
+      // another.
       question_.outside = kept.step + error_ < apart;
       // After a long step the spheres' bound is better than the kept pairs'.
       if (!is_short(kept.step, mesh_a_, mesh_b_, pose.a_from_b.scale, apart))

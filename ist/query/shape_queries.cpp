@@ -21,8 +21,8 @@
 namespace ist {
 namespace {
 
-/// The sums of a traversal of a tree against a surface: summed balls, nodes wholly inside, and
-/// unopened nodes, of which half counts. `bins`: get the same.
+/// The sums of a traversal of a tree against a surface: summed balls, nodes wholly inside, and half
+/// of each unopened node. `bins` get the same sums.
 class ProbeTally {
  public:
   ProbeTally(const SphereTree& probes, const RelativePose& pose, ContactBins* bins) noexcept

@@ -78,7 +78,6 @@ RayHit hit_at(const SolidFrame& frame, const OwnRay& ray, double distance, const
           (frame.rotation * normal).normalized(), triangle, QueryStatus::ok};
 }
 
-/// A placed asset's mesh.
 class MeshOfSolid {
  public:
   explicit MeshOfSolid(const PlacedAsset& placed) noexcept {

@@ -8,23 +8,23 @@
 
 namespace ist {
 
-/// Where a body stands among the others.
+/// The place of a body among the others.
 enum class Place : std::uint8_t {
-  free,     ///< it is none
+  free,     ///< there is no body
   tree,     ///< its box is in a hierarchy
   endless,  ///< it has no box
   refused,  ///< its pose or scale is not usable
 };
 
-/// By how much boxes are wider than solids.
+/// The margins of boxes around solids.
 struct BoxWidths {
   double margin = 0;        ///< [u]
-  double duration = 0;      ///< [T] of motions that they hold
-  bool by_spheres = false;  ///< by what matched spheres stick out
-  bool by_size = false;     ///< by the tolerance of impacts for which none is asked
+  double duration = 0;      ///< [T] of motions that boxes contain
+  bool by_spheres = false;  ///< by the protrusion of matched spheres
+  bool by_size = false;     ///< by the default tolerance of impacts
 };
 
-/// Eight bodies, a lane each: what of their boxes does not change [u], and their poses.
+/// Eight bodies, one per lane: the constant part of their boxes [u], and their poses.
 struct alignas(64) BodyBlock {
   static constexpr std::size_t kCount = 8;
 
@@ -43,7 +43,7 @@ struct alignas(64) BodyBlock {
 /// Their boxes: the same bits as SolidBox::placed() and WorldBox::write().
 struct alignas(64) BlockBoxes {
   float low[3][BodyBlock::kCount], high[3][BodyBlock::kCount];
-  std::uint32_t placed = 0;  ///< bit k: the k-th pose is usable and floats hold its box
+  std::uint32_t placed = 0;  ///< bit k: the k-th pose is usable and its box fits floats
 
   SceneBox box(std::size_t k) const noexcept {
     return {{low[0][k], low[1][k], low[2][k]}, {high[0][k], high[1][k], high[2][k]}};
@@ -53,13 +53,13 @@ struct alignas(64) BlockBoxes {
 /// Writes the boxes of these lanes, and may write others.
 void place_boxes(const BodyBlock& block, std::uint32_t lanes, BlockBoxes& boxes) noexcept;
 
-/// What of a body's box does not change with its pose.
+/// The part of a body's box that does not depend on its pose.
 class BodyBox {
  public:
   BodyBox() = default;
   explicit BodyBox(const PlacedSolid& solid) noexcept;
 
-  /// In the world: `to`, if it has one.
+  /// Writes the box in the world to `to`, if there is one.
   Place place(const Pose& pose, const BoxWidths& widths, const Motion& motion,
               SceneBox& to) const noexcept {
     const Rotation rotation = Rotation::of(pose.q);
@@ -72,7 +72,7 @@ class BodyBox {
     return Place::tree;
   }
 
-  /// Writes what place_boxes() needs but the pose; false if that cannot make its box.
+  /// Writes the input of place_boxes() except the pose; false if that cannot compute its box.
   bool put(BodyBlock& block, std::size_t k, const BoxWidths& widths) const noexcept {
     for (int c = 0; c < 3; ++c) {
       block.middle[c][k] = box_.middle[c];
@@ -88,12 +88,12 @@ class BodyBox {
     return widths.margin + (widths.by_spheres ? box_.protrusion : 0) +
            (widths.by_size ? tolerance_ : 0);
   }
-  /// Widens a box by a motion; false if that is none.
+  /// Widens a box by a motion; false if that is invalid.
   bool sweep(WorldBox& box, double duration, const Motion& motion) const noexcept;
 
   SolidBox box_;  ///< scaled
   double scale_ = 1;
-  double tolerance_ = 0;  ///< [u] at least this body's share of an impact's
+  double tolerance_ = 0;  ///< [u] lower bound of this body's share of an impact's
 };
 
 }  // namespace ist

@@ -21,7 +21,7 @@ HWY_INLINE Vec3 load(const double (&from)[3][BodyBlock::kCount], std::size_t i) 
   return {hn::LoadU(d, from[0] + i), hn::LoadU(d, from[1] + i), hn::LoadU(d, from[2] + i)};
 }
 
-/// As float_below().
+/// Vector version of float_below().
 HWY_INLINE hn::Vec<hn::Rebind<float, D>> float_below(V x) {
   const hn::Rebind<float, D> df;
   const auto nearest = hn::DemoteTo(df, x);
@@ -41,7 +41,7 @@ HWY_ATTR void place_all(const BodyBlock& block, std::uint32_t lanes, BlockBoxes&
         hn::And(norm >= constant(kShortestDirection), norm <= constant(kLongestDirection));
     V w = q0;
     Vec3 v = {q1, q2, q3};
-    if (!hn::AllTrue(d, norm == constant(1))) {  // bodies that are not turned skip this
+    if (!hn::AllTrue(d, norm == constant(1))) {  // bodies without a rotation skip this
       // (no lane divides by zero, or overflows)
       const V by = hn::IfThenElse(placed, norm, constant(1));
       const auto unit = [&](V q) { return hn::IfThenElseZero(placed, q) / by; };

@@ -16,7 +16,7 @@ void BoxTree::take_room(std::size_t most) {
   nodes_.reserve(most + 1);
   order_.reserve(most);
   if (lane_of_.size() < most) lane_of_.resize(most, kNone);
-  // A pair waits for each level of both; in the worst case a hierarchy is a chain.
+  // One pair is pending for each level of both; in the worst case a hierarchy is a chain.
   if (stack_.size() < 2 * most + 64) stack_.resize(2 * most + 64);
 }
 
@@ -61,7 +61,7 @@ void BoxTree::add(std::uint32_t body, const SceneBox& box) noexcept {
   ++leaves_;
   ++added_;
   if (root_ == kNone) root_ = take_node();
-  // Down to where the least area is added.
+  // Descends to where the least area is added.
   std::uint32_t at = root_;
   for (;;) {
     const std::uint32_t used = nodes_[at].used;
@@ -120,7 +120,7 @@ void BoxTree::remove(std::uint32_t body) noexcept {
 
 void BoxTree::refit() noexcept {
   if (root_ == kNone) return;
-  // As dear as to build it: an order that is broken.
+  // A broken order costs as much as building it anew.
   if (!in_order_) return build();
   if (refit_nodes(nodes_) > kWorn * built_area_) build();
 }
@@ -163,7 +163,7 @@ void BoxTree::part(Leaf* first, Leaf* at, Leaf* last) noexcept {
 std::uint32_t BoxTree::build(Leaf* first, Leaf* last) noexcept {
   const auto node = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back();
-  // Full ones below, as far as they go.
+  // Full nodes below, as many as possible.
   std::ptrdiff_t full = 1;
   while (full * kLanes < last - first) full *= kLanes;
   std::uint32_t lane = 0;

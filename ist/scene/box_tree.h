@@ -25,7 +25,7 @@ struct SceneBox {
     return out;
   }
   bool operator==(const SceneBox&) const = default;
-  /// Half its surface; finite boxes alone are compared by it.
+  /// Half its surface, for comparing finite boxes.
   double area() const noexcept {
     const double x = double{high[0]} - low[0], y = double{high[1]} - low[1],
                  z = double{high[2]} - low[2];
@@ -88,8 +88,8 @@ struct alignas(64) BoxNode {
 };
 static_assert(sizeof(BoxNode) == 256);
 
-/// Two nodes, of which some pairs of lanes are still to be looked at; at most one of a pair is a
-/// body's.
+/// Two nodes with the pairs of lanes that are still to be examined; at most one lane of a pair is a
+/// body.
 struct LanePairs {
   std::uint32_t a, b;
   std::uint64_t left;  ///< bit 8 · (A's lane) + (B's lane)
@@ -128,7 +128,7 @@ class BoxTree {
   void take_room(std::size_t most);
 
   std::uint32_t size() const noexcept { return leaves_; }
-  /// Many that are added in a row are cheaper to settle() at once.
+  /// settle() is cheaper than this for many bodies.
   void add(std::uint32_t body, const SceneBox& box) noexcept;
   void remove(std::uint32_t body) noexcept;
   /// Sets the box of a body and those above it.
@@ -137,7 +137,7 @@ class BoxTree {
     nodes_[lane / kLanes].set(lane % kLanes, box);
     fit_above(lane / kLanes);
   }
-  /// Sets the boxes of some of the bodies from `first` on: until refit() nothing may be asked.
+  /// Sets the boxes of some of the bodies from `first` on; no queries until refit().
   void put(std::uint32_t first, std::uint32_t of, const float (&low)[3][kLanes],
            const float (&high)[3][kLanes]) noexcept {
     for (const std::uint32_t k : set_bits(of)) {
@@ -153,15 +153,15 @@ class BoxTree {
     const std::uint32_t lane = lane_of_[body];
     return nodes_[lane / kLanes].box(lane % kLanes);
   }
-  /// Sets all boxes above those of bodies, and builds anew where they have grown too much.
+  /// Refits all boxes above those of bodies, and rebuilds if they have grown too much.
   void refit() noexcept;
-  /// Builds anew where many were added.
+  /// Rebuilds if many were added.
   void settle() noexcept {
     if (2 * added_ > leaves_) build();
   }
 
-  /// visit(body) of the leaves below the boxes that enter(box) lets in; it may be asked again of a
-  /// box.
+  /// visit(body) of the leaves below the boxes that enter(box) lets in; it may be called again for
+  /// a box.
   template <class Enter, class Visit>
   void each(const Enter& enter, const Visit& visit) const noexcept {
     visit_lanes(
@@ -179,7 +179,7 @@ class BoxTree {
     visit_lanes([&](const BoxNode& node) { return node.meeting(box); }, visit);
   }
   /// visit(k, body) of the leaves whose boxes meet the k-th. Nodes of one box are fetched while
-  /// those of others are looked at: a large hierarchy is not in the cache.
+  /// those of others are examined: a large hierarchy is not in the cache.
   template <class Visit>
   void each_meeting(std::span<const SceneBox> boxes, const Visit& visit) const noexcept {
     if (root_ == kNone) return;
@@ -271,7 +271,7 @@ class BoxTree {
   std::uint32_t root_ = kNone, leaves_ = 0;
   double built_area_ = 0;  ///< of all nodes, when they were built
   std::size_t added_ = 0;  ///< since
-  bool in_order_ = true;   ///< no node is taken out, and each stands before those below it
+  bool in_order_ = true;   ///< no node was removed, and each precedes those below it
 };
 
 }  // namespace ist

@@ -40,7 +40,7 @@ void Scene::add(const SceneBody& body) {
     at = all.free_bodies.back();
     all.free_bodies.pop_back();
   } else {
-    // Those of bodies that were removed since the last step are not free yet.
+    // Slots of bodies removed since the last step are not free yet.
     at = static_cast<std::uint32_t>(all.bodies.size());
     all.take_room(at + std::size_t{1});
     all.bodies.emplace_back();
@@ -208,7 +208,7 @@ BodyBox::BodyBox(const PlacedSolid& solid) noexcept {
     scale_ = field.scale;
   }
   box_.scale(scale_);
-  // As time_of_impact() has it: of the smaller solid, or of the errors of both.
+  // As in time_of_impact(): by the smaller solid, or by the errors of both.
   tolerance_ = std::max(1e-3 * vector(box_.half).norm(), 10 * box_.mesh_error);
 }
 
@@ -216,7 +216,7 @@ bool BodyBox::sweep(WorldBox& box, double duration, const Motion& motion) const 
   if (!motion.velocity.allFinite() || !motion.angular_velocity.allFinite() ||
       !motion.about.allFinite())
     return false;
-  // A point that turns about another goes no further than the arc, nor than twice its distance.
+  // A point that rotates about another moves no further than the arc, or twice its distance.
   const Eigen::Vector3d far =
       (vector(box_.middle) - scale_ * motion.about).cwiseAbs() + vector(box_.half);
   const double angle = motion.angular_velocity.norm() * duration;

@@ -19,10 +19,10 @@ constexpr std::uint32_t kCount = BodyBlock::kCount;
 /// The bodies of a scene and their boxes in two hierarchies: of those that move, and of the others.
 struct SceneBodies {
   struct Body {
-    SceneBody given;  ///< but its pose, which is in its block
+    SceneBody given;  ///< without its pose, which is in its block
     BodyBox kept;
   };
-  /// What is asked of a body for every box that its own meets.
+  /// The data of a body needed for every box that its own meets.
   struct Filtered {
     std::uint32_t layers = 0, meets = 0;
     std::uint8_t group = 0;
@@ -31,7 +31,7 @@ struct SceneBodies {
   };
   /// States of a block's bodies, a bit each.
   struct Lanes {
-    std::uint8_t in_vectors = 0;  ///< place_boxes() makes their boxes
+    std::uint8_t in_vectors = 0;  ///< place_boxes() computes their boxes
     std::uint8_t moving = 0;      ///< their boxes are in that hierarchy, as in `still`
     std::uint8_t still = 0;
     std::uint8_t waiting = 0;  ///< for put_waiting()
@@ -43,7 +43,7 @@ struct SceneBodies {
     take_room(most);
   }
 
-  /// For as many bodies, also those that were removed since the last step.
+  /// Reserves memory for `most` bodies, including those removed since the last step.
   void take_room(std::size_t most) {
     bodies.reserve(most);
     const std::size_t of_eight = (most + kCount - 1) / kCount;
@@ -125,7 +125,7 @@ struct SceneBodies {
     if (auto* const list = list_of(place)) list->erase(std::find(list->begin(), list->end(), i));
   }
 
-  /// put_waiting() must follow, which puts bodies where they stand.
+  /// put_waiting() must follow, which updates the bodies' boxes.
   void wait(std::uint32_t block, std::uint32_t of) noexcept {
     Lanes& all = lanes[block];
     if (all.waiting == 0) waiting.push_back(block);
@@ -193,7 +193,7 @@ struct SceneBodies {
     put_waiting(true);
   }
 
-  /// set(block, lane, values…) of rows of those that there are. Returns how many.
+  /// Calls set(block, lane, values…) for the rows of existing bodies; returns their number.
   template <class Values, class Set>
   std::size_t set_all(std::span<const std::uint32_t> numbers, const Values& values,
                       const Set& set) noexcept {
@@ -246,7 +246,7 @@ struct SceneBodies {
   std::vector<BodyBlock> blocks;  ///< eight bodies each, as in `lanes`
   std::vector<Lanes> lanes;
   std::vector<std::uint32_t> waiting, moved;  ///< blocks that have such lanes
-  std::size_t moved_count = 0;                ///< bodies, of those that were removed too
+  std::size_t moved_count = 0;                ///< bodies, including removed ones
   std::unordered_map<std::uint32_t, std::uint32_t> index_of;
   std::vector<std::uint32_t> free_bodies, removed, endless, refused_bodies;
   std::vector<std::uint32_t> refused;  ///< numbers of those, sorted in a step

@@ -20,7 +20,7 @@ inline ScenePairName name_of(std::uint64_t key) noexcept {
 
 /// The bodies of a scene, their pairs and the answers.
 struct Scene::Impl : SceneBodies {
-  /// Two bodies of which one moved whose boxes meet.
+  /// Two bodies whose boxes meet, at least one of which moved.
   struct Found {
     std::uint64_t key;      ///< numbers, the lower one first
     std::uint32_t body[2];  ///< indices, of the lower number first
@@ -68,7 +68,7 @@ struct Scene::Impl : SceneBodies {
             ~(unsigned{a.is_field} & b.is_field) &
             static_cast<unsigned>(answer_of(i, j) != SceneAnswer::nothing)) != 0;
   }
-  /// False of numbers, a the lower one, that are excluded or filtered out.
+  /// False if a pair of numbers, a the lower, is excluded or filtered out.
   bool is_let(std::uint32_t a, std::uint32_t b) const noexcept {
     return !std::binary_search(excluded.begin(), excluded.end(), key_of(a, b)) &&
            (filter == nullptr || filter(context, a, b));
@@ -104,7 +104,7 @@ struct Scene::Impl : SceneBodies {
     found.insert(found.end(), kept, kept + count);
   }
 
-  /// Pairs of which a body moved whose boxes meet.
+  /// Finds the pairs whose boxes meet and one of whose bodies moved.
   void find_candidates() noexcept {
     every = all_moved();
     picks = !excluded.empty() || filter != nullptr;
@@ -153,7 +153,7 @@ struct Scene::Impl : SceneBodies {
     return !has_moved(two.body[0]) && !has_moved(two.body[1]);
   }
 
-  /// Pairs of the step before of which no body moved: their answers stay.
+  /// Counts the pairs of the step before without a moved body: their answers stay.
   std::size_t count_kept() noexcept {
     if (!kept)
       kept = static_cast<std::size_t>(std::count_if(
@@ -161,7 +161,7 @@ struct Scene::Impl : SceneBodies {
     return *kept;
   }
 
-  /// A place for an answer; those of before are used again.
+  /// A slot for an answer; old slots are reused.
   std::uint32_t take_slot() noexcept {
     if (free_slots.empty()) {
       penetrations.emplace_back();
@@ -216,7 +216,7 @@ struct Scene::Impl : SceneBodies {
     }
   }
 
-  /// By key, digit by digit of those in which keys differ.
+  /// Sorts by key, digit by digit of those in which keys differ.
   void sort_found() noexcept {
     constexpr std::size_t kFew = 64;
     if (found.size() < kFew) {
@@ -227,7 +227,7 @@ struct Scene::Impl : SceneBodies {
     std::uint64_t differ = 0;
     for (const Found& two : found) differ |= two.key ^ found[0].key;
     sorted.resize(found.size());
-    // Of many, one number of a pair at once.
+    // Many are sorted by one number of a pair at once.
     constexpr int kFewest = 8, kMost = 13;
     const int bits = found.size() < 4096
                          ? kFewest
@@ -247,7 +247,7 @@ struct Scene::Impl : SceneBodies {
     }
   }
 
-  /// Answers the pairs of which a body moved.
+  /// Answers the pairs with a moved body.
   void ask_found(const ParallelFor& parallel) noexcept {
     sort_found();
     fresh.clear();
@@ -278,7 +278,7 @@ struct Scene::Impl : SceneBodies {
     find_candidates();
     if (exceeded) {
       out.boxes_met = count_kept() + found.size();
-      // What moved is asked in the next step.
+      // Moved bodies are queried in the next step.
       out.pairs_exceeded = true;
       return out;
     }
@@ -305,8 +305,8 @@ struct Scene::Impl : SceneBodies {
     return out;
   }
 
-  /// Merges the pairs that stay, if there are any, with those that were asked: all, those that
-  /// meet, those that ended.
+  /// Merges the pairs that stay, if any, with the queried ones: all, those that meet, and those
+  /// that ended.
   void merge(bool some_stay) noexcept {
     std::swap(now, before);
     now.clear();
@@ -357,20 +357,20 @@ struct Scene::Impl : SceneBodies {
   const void* context = nullptr;
   std::vector<Found> found, sorted;
   std::vector<Candidate> now, before, fresh;
-  std::optional<std::size_t> kept;  ///< count_kept(), once it is asked in a step
+  std::optional<std::size_t> kept;  ///< count_kept(), once computed in a step
   std::vector<ScenePair> pairs;
   std::vector<Penetration> penetrations;  ///< by slot, as the three below
   std::vector<Separation> separations;
-  std::vector<ContactPatch> patches;  ///< once a rule asks for them, as impacts
+  std::vector<ContactPatch> patches;  ///< if a rule requests them; impacts likewise
   std::vector<TimeOfImpact> impacts;
   std::vector<std::uint32_t> free_slots;
   std::vector<ScenePairName> ended;
-  // Of a search for pairs:
+  // State of a search for pairs:
   bool every = false;          ///< all bodies moved
   bool picks = false;          ///< some pairs are excluded, or there is a filter
-  std::size_t most_found = 0;  ///< as long as there are fewer they are not too many
+  std::size_t most_found = 0;  ///< fewer pairs are not too many
   bool exceeded = false;
-  std::deque<std::vector<float>> recorded;  ///< what fields of a record point to
+  std::deque<std::vector<float>> recorded;  ///< the data of a record's shapes
   std::vector<Workspace> workspaces;
 };
 

@@ -54,7 +54,7 @@ SceneNearest Scene::nearest(const Eigen::Vector3d& point, double max_distance) c
       const auto i = static_cast<std::size_t>(k);
       off[k] = std::max({0.0, box.low[i] - point[k], point[k] - box.high[i]});
     }
-    // A body that holds the point is in a box that holds it.
+    // A body that contains the point is in a box that contains it.
     return off.stableNorm() <= std::max(farthest, 0.0) * (1 + 1e-9);
   };
   const auto visit = [&](std::uint32_t i) {

@@ -10,7 +10,8 @@
 
 #include "scene/scene_impl.h"
 
-// A scene before a step, in bytes and back: pass() says once what is written and read.
+// Converts a scene before a step to bytes and back: pass() lists once the members to write and
+// read.
 
 namespace ist {
 namespace {
@@ -20,7 +21,7 @@ static_assert(std::endian::native == std::endian::little);
 struct RecordHeader {
   char magic[8] = {'i', 's', 't', '-', 's', 'c', 'n', '\0'};
   std::uint64_t version = 1;
-  std::uint64_t hash = 0;  ///< XXH3-64 of what follows
+  std::uint64_t hash = 0;  ///< XXH3-64 of the following bytes
 };
 
 [[noreturn]] void fail(const std::string& what) { throw Error("scene record: " + what); }
@@ -79,7 +80,7 @@ class Reader {
     if (value > static_cast<std::underlying_type_t<E>>(most)) fail("a choice is out of range");
     x = static_cast<E>(value);
   }
-  /// Of things that are no smaller than this in the record.
+  /// The number of items, each of which takes at least this many bytes in the record.
   std::size_t count(std::size_t, std::size_t bytes) {
     std::uint64_t count = 0;
     number(count);
@@ -231,7 +232,7 @@ void pass(Io& io, SceneBody& body) {
   pass(io, body.solid);
 }
 
-/// All of a scene that decides its next step.
+/// All data of a scene that determines its next step.
 struct Recorded {
   SceneSettings settings;
   std::array<SceneRule, kSceneGroups * kSceneGroups> rules;
@@ -252,7 +253,7 @@ void pass(Io& io, Recorded& all) {
   for (SceneBody& body : all.bodies) pass(io, body);
 }
 
-/// Memory for what it holds: of n bodies no more pairs meet.
+/// Limits memory: no more pairs of n bodies can meet.
 void limit_pairs(Recorded& all) {
   const std::size_t n = all.bodies.size();
   all.settings.max_pairs =
@@ -268,7 +269,7 @@ std::vector<std::byte> Scene::record() const {
     if (two.meet) all.met.push_back(two.key);
   for (const std::uint32_t number : numbers()) all.bodies.push_back(*body(number));
   limit_pairs(all);
-  // A filter is what it refuses now.
+  // A filter is recorded by the pairs that it refuses now.
   if (own.filter != nullptr)
     for (std::size_t j = 0; j < all.bodies.size(); ++j)
       for (std::size_t i = 0; i < j; ++i) {
@@ -315,7 +316,7 @@ Scene Scene::replay(std::span<const std::byte> record, std::span<const AssetView
     std::sort(made.excluded.begin(), made.excluded.end());
     std::sort(all.met.begin(), all.met.end());
     all.met.erase(std::unique(all.met.begin(), all.met.end()), all.met.end());
-    // Whichever bodies they are: all are asked again.
+    // All pairs are queried again, whichever bodies these are.
     for (const std::uint64_t key : all.met)
       if (n > 0 && made.now.size() < all.settings.max_pairs)
         made.now.push_back({.key = key, .body = {0, 0}, .meet = true});

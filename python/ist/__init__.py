@@ -9,7 +9,7 @@ import enum
 
 from . import _calls, _core, _shown
 
-# Before anything is taken from there. One answer's code is an enum's.
+# Before any import from there. One answer's code is an enum's.
 for _owner in (_core, _core.gpu, *(x for x in vars(_core).values() if isinstance(x, type))):
     _calls.name_faults(_owner, {name: lambda codes: _one(codes, YesNo)
                                 for name in ("overlap", "contains")})
@@ -28,7 +28,7 @@ class QueryStatus(enum.IntEnum):
 
     ok = 0
     budget_exhausted = 1  # a limit stopped it: volume_min, volume_max contain the finished answer's
-    # The row is all NaN; one pose raises instead:
+    # The row is all NaN; a query of a single pose raises instead:
     invalid_input = 2  # a pose, a scale or a Shape's number is invalid: ValueError
     missing_data = 3  # a solid lacks what the measure needs: Error
     error_exceeded = 4  # finished, but the error is larger than relative_error

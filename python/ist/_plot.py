@@ -134,7 +134,7 @@ def _overlaps(solids, poses, scales):
                 contact = found.contact.penetration
             else:
                 contact = ist.penetration(solids[i], solids[k], poses[k], **placed)
-        except ist.Error as error:  # one lacks what it takes; both are drawn
+        except ist.Error as error:  # one lacks the data; both are drawn
             lines.append(f"overlap of {i} and {k}: {error}")
             continue
         if contact.volume > 0:

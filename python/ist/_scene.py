@@ -101,7 +101,8 @@ class Volumes(Answers):
         self.found = self.ask(ist.penetration, ["volume", *names], self.scales[1])
         self.value = self.found["volume"].reshape(self.shape)
         if wants_scale:
-            # As python/src/penetration.cpp; here, for memory on a GPU is the caller's framework's.
+            # Repeats python/src/penetration.cpp, since memory on a GPU belongs to the caller's
+            # framework.
             step = self.scales[1] / 2048
             more, less = (self.ask(ist.penetration, ["volume"], self.scales[1] + by)["volume"]
                           for by in (step, -step))
@@ -110,7 +111,7 @@ class Volumes(Answers):
     def pose_gradients(self):
         """Of A's and of B's."""
         push, turn = -self.found["force"], -self.found["torque"]
-        # What turns and moves B is undone by the same about A's origin.
+        # A motion of B is equivalent to the inverse motion about A's origin.
         turn_a = -(turn + self.array.cross(self._away(), push))
         return self.by_pose(0, -push, turn_a), self.by_pose(1, push, turn)
 

@@ -92,7 +92,7 @@ def _differentiable(kind, solids, poses, pairs, scales, settings):
 
 
 def _times(slope, gradient):
-    return jnp.where(slope == 0, 0, slope * gradient)  # of what nobody asks, NaN is nothing
+    return jnp.where(slope == 0, 0, slope * gradient)  # NaN in an unused output does no harm
 
 
 def _answers(xp, array, kind, scene, settings, poses, scales, with_gradients):

@@ -17,7 +17,7 @@ import ist
 __all__ = ["CollisionManager", "ContactData", "DistanceData", "scene_to_collision"]
 
 _ASIDE, _WAY = 1e-9, np.array([0.36, 0.48, 0.8])  # of an object's size, and where to
-_FIRST = 16  # distances that are asked first: the best of them bounds the others
+_FIRST = 16  # distances that are queried first: the best of them bounds the others
 
 
 class _Data:
@@ -315,7 +315,7 @@ def scene_to_collision(scene, *, repair=False):
         if not hasattr(mesh, "faces"):  # a path or points
             continue
         if np.abs(transform[:3, :3].T @ transform[:3, :3] - np.eye(3)).max() > 1e-9 or np.linalg.det(transform) < 0:
-            # The mesh takes what no pose has: scales and mirror images.
+            # The mesh takes the part of the transform that is not a pose: scales and mirror images.
             mesh = mesh.copy()
             mesh.apply_transform(transform)
             transform = None
@@ -470,7 +470,7 @@ def _deepest(pairs):
         if best > 0 and len(touch) > 0:
             point, = pairs.touched(chosen, answers, touch)
             best, nearest = 0.0, (pairs, int(chosen[touch[0]]), (point, point))
-        # The likely deepest first. None is deeper than the cube root of its volume.
+        # The probably deepest first. None is deeper than the cube root of its volume.
         likely = np.argsort(-_depths(answers.volume, np.linalg.norm(answers.force, axis=1)), kind="stable")
         most = -np.cbrt(answers.volume[likely])
         for asked in slice(1), slice(1, None):

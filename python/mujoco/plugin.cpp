@@ -39,7 +39,7 @@ struct Tree {
   bool has_mesh() const { return info.mesh_triangles > 0; }
 };
 
-/// One copy of what a key names, whichever models and states use it. `make` fills the tree.
+/// One copy for each key, shared by all models and states that use it. `make` fills the tree.
 template <class Key, class Make>
 std::shared_ptr<Tree> shared(const Key& key, Make make) {
   static std::mutex mutex;
@@ -58,7 +58,7 @@ struct Triangles {
   std::vector<std::array<double, 3>> vertices;
   std::vector<std::array<uint32_t, 3>> faces;
 
-  /// Bakes the surface alone: exact queries need no spheres.
+  /// Bakes only the mesh: exact queries need no spheres.
   bool bake(ist_asset_t& tree, std::string& message) const {
     ist_bake_settings_t settings = {};
     settings.size = sizeof settings;
@@ -73,8 +73,8 @@ struct Triangles {
   }
 };
 
-/// What a primitive geom is a multiple of: its type and its half sizes over `scale_of`. The exact
-/// measure meets it as a mesh, inscribed, so that it makes no contact where the solids are apart.
+/// Identifies primitive geoms up to scale: type and half sizes over `scale_of`. The exact measure
+/// uses an inscribed mesh, which makes no contact if the solids are apart.
 using ShapeKey = std::array<double, 4>;
 
 double scale_of(int type, const mjtNum* size) {
@@ -95,8 +95,8 @@ ShapeKey shape_key(int type, const mjtNum* size) {
 
 bool is_primitive(int type) { return type >= mjGEOM_SPHERE && type <= mjGEOM_BOX; }
 
-/// Rings from pole to pole. A ball's are those of an octahedron's faces, divided: no vertex has
-/// many triangles. Within 1/1,800 of the radius of what is round.
+/// Rings from pole to pole. Those of a ball subdivide the faces of an octahedron: no vertex has
+/// many triangles. The mesh is within 1/1,800 of the radius of a round shape.
 Triangles mesh_of(const ShapeKey& key) {
   constexpr uint32_t kQuarter = 24;  // of a ring's points
   struct Ring {
@@ -160,14 +160,14 @@ struct Shape {
   ShapeKey key = {};
 };
 
-/// What an <instance> configures.
+/// The configuration of an <instance>.
 struct Instance {
   std::shared_ptr<Tree> tree;
-  int patches = 0;  ///< 0: by the pair's measure
+  int patches = 0;  ///< 0: chosen by the pair's measure
   uint32_t measure = IST_EXACT;
   double scale = 0;           ///< 0: the mesh's
-  uint64_t number = 0;        ///< its own in this process; copies have the same content
-  int geom = -1;              ///< one that has this instance
+  uint64_t number = 0;        ///< unique in this process; copies have the same content
+  int geom = -1;              ///< one of the geoms with this instance
   ist_placed_t local = {};    ///< the asset in that geom's own frame, for rays
   std::vector<Shape> shapes;  ///< of the model's primitive geoms, by geom; else empty
 };
@@ -197,8 +197,8 @@ void write_pose(Pose& pose, const mjtNum* q, const mjtNum* t) {
   for (int k = 0; k < 3; ++k) pose.t[k] = t[k];
 }
 
-/// An asset is in the frame of the mesh's file; MuJoCo moves a mesh to its centre of mass and turns
-/// it to its principal axes. `quat`, `pos`: of the geom.
+/// An asset is in the frame of the mesh's file; MuJoCo moves a mesh to its centre of mass and
+/// rotates it to its principal axes. `quat`, `pos`: of the geom.
 ist_placed_t place(const mjModel* m, const mjtNum* quat, const mjtNum* pos, int geom,
                    const Instance& solid) {
   ist_placed_t out = {};
@@ -223,7 +223,7 @@ ist_placed_t place(const mjModel* m, const mjData* d, int geom, const Instance& 
   return place(m, d->geom_xquat + 4 * geom, d->geom_xpos + 3 * geom, geom, solid);
 }
 
-/// A geom without an asset, as a shape. False: there is none for it.
+/// A geom without an asset, as a shape. False if there is no such shape.
 bool shape_of(const mjModel* m, const mjData* d, int geom, ist_shape_t& field,
               ist_placed_t& placed) {
   field = {};
@@ -257,12 +257,12 @@ bool shape_of(const mjModel* m, const mjData* d, int geom, ist_shape_t& field,
   }
 }
 
-/// At the patch's point a force acts as the patch does: at its centroid it would have another
+/// A force at the patch's point is equivalent to the patch; at its centroid it would have another
 /// torque.
 void write_contact(const ist_contact_patch_t& patch, mjPreContact& out) {
   mjtNum shift[3];
   mju_sub3(shift, patch.point, patch.centroid);
-  // A patch that pushes both ways has its point far away, and little area.
+  // A patch that pushes in both directions has its point far away, and little area.
   const double length = mju_norm3(shift), most = 2 * std::sqrt(patch.area);
   if (length > most) mju_scl3(shift, shift, most / length);
   for (int k = 0; k < 3; ++k) {
@@ -270,7 +270,7 @@ void write_contact(const ist_contact_patch_t& patch, mjPreContact& out) {
     out.normal[k] = patch.normal[k];
     out.tangent[k] = 0;
   }
-  // Where forces cancel the area goes to nothing: the cube root of the volume bounds the depth.
+  // The area vanishes where forces cancel, so the cube root of the volume bounds the depth.
   out.dist = -std::min(patch.volume / patch.area, std::cbrt(patch.volume));
 }
 
@@ -281,13 +281,13 @@ void complain_once(const char* text) {
   if (!std::exchange(said[text], true)) mju_warning("%s", text);
 }
 
-/// MuJoCo's own function for a geom against the hull of g2's mesh. It may write as many
-/// contacts as two geoms can have, and there may be room for fewer.
+/// MuJoCo's own function for a geom against the hull of g2's mesh. It may write the maximum number
+/// of contacts of two geoms, while there may be memory for fewer.
 int collide_hull(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtNum margin) {
   mjPreContact all[mjMAXCONPAIR];
-  const int type = std::min<int>(m->geom_type[g1], mjGEOM_MESH);  // of a solid its hull too
+  const int type = std::min<int>(m->geom_type[g1], mjGEOM_MESH);  // for a solid its hull too
   const mjfCollision collide_convex = before[type][mjGEOM_MESH];
-  // A margin of metres, as mj_geomDistance() has, makes depths of what overlaps wrong.
+  // A margin of metres, as in mj_geomDistance(), makes the depths of overlaps wrong.
   int count = collide_convex(m, d, all, g1, g2, 0);
   if (count == 0 && margin > 0) count = collide_convex(m, d, all, g1, g2, margin);
   count = std::min(count, mj_maxContact(m, g1, g2, margin > 0));
@@ -295,8 +295,8 @@ int collide_hull(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2,
   return count;
 }
 
-/// A ball g1 against a solid's mesh: the nearest point of the mesh, and whatever else the ball is
-/// in once it is pushed out there, such as the other wall of a groove.
+/// A ball g1 against a solid's mesh: the nearest point of the mesh, and anything that the ball
+/// still overlaps once it is pushed out there, such as the other wall of a groove.
 int collide_ball(const mjModel* m, mjData* d, mjPreContact* out, int g1, const ist_placed_t& solid,
                  mjtNum margin, int most) {
   const mjtNum radius = m->geom_size[3 * g1];
@@ -326,7 +326,7 @@ int collide_ball(const mjModel* m, mjData* d, mjPreContact* out, int g1, const i
   return count;
 }
 
-/// The measure of two solids, or nothing if what they hold does not serve one.
+/// The measure of two solids, or nothing if their data suits none.
 std::optional<uint32_t> measure_of(const Instance& a, const Instance& b) {
   const uint32_t wish = a.measure == IST_EXACT ? b.measure : a.measure;
   if (wish != IST_EXACT && a.tree->info.spheres > 0 && b.tree->info.spheres > 0) return wish;
@@ -334,8 +334,8 @@ std::optional<uint32_t> measure_of(const Instance& a, const Instance& b) {
   return std::nullopt;
 }
 
-/// Where one solid is wholly inside the other no force of the overlap leads out: a contact that
-/// pushes the inner one to the nearest face, as deep as its own size at most.
+/// If one solid is wholly inside the other, no force of the overlap leads out. Returns a contact
+/// that pushes the inner one to the nearest face, at most as deep as its own size.
 bool find_way_out(const ist_placed_t& a, const ist_placed_t& b, const ist_penetration_t& whole,
                   mjPreContact& out) {
   constexpr double kWhole = 0.99, kNone = 0.01;
@@ -361,12 +361,12 @@ bool find_way_out(const ist_placed_t& a, const ist_placed_t& b, const ist_penetr
   return false;
 }
 
-/// MuJoCo's collision function of two geoms of which the second is of type sdf: types come in the
-/// order of mjtGeom, and sdf is the last.
+/// MuJoCo's collision function of two geoms, the second of type sdf: types are in the order of
+/// mjtGeom, and sdf is the last.
 int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtNum margin) {
   const int type = m->geom_type[g1];
   const Instance *first = instance_of(m, d, g1), *second = instance_of(m, d, g2);
-  // An SDF of another plug-in: MuJoCo asks both for distances.
+  // An SDF of another plug-in: MuJoCo queries distances of both.
   if (second == nullptr || (first == nullptr && type == mjGEOM_SDF))
     return before[type][mjGEOM_SDF](m, d, out, g1, g2, margin);
   ist_contact_settings_t settings = {};
@@ -394,11 +394,11 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
     const Shape& shape = second->shapes[static_cast<size_t>(g1)];
     const ShapeKey now = shape_key(type, m->geom_size + 3 * g1);
     bool same = shape.tree != nullptr && second->tree->has_mesh();
-    // A planet's facets are too coarse for a stone.
+    // The facets of a huge shape are too coarse for a tiny solid.
     const bool flat = type == mjGEOM_BOX || type == mjGEOM_CYLINDER;
     same = same && (flat || scale_of(type, m->geom_size + 3 * g1) < 50 * m->geom_rbound[g2]);
     for (size_t k = 0; k < now.size(); ++k) same = same && std::fabs(now[k] - shape.key[k]) < 1e-6;
-    // There, and where the model has changed since mjData was made, MuJoCo asks for distances.
+    // In that case, and if the model has changed since mjData was made, MuJoCo queries distances.
     if (!same) return before[type][mjGEOM_SDF](m, d, out, g1, g2, margin);
     settings.measure = IST_EXACT;
     a = {};
@@ -409,7 +409,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   }
   Scratch& memory = scratch();
   const ist_placed_t b = place(m, d, g2, *second);
-  // Steps of this pair in this data are those of one motion.
+  // Steps of this pair in this data belong to one motion.
   settings.pair_id = static_cast<uint32_t>((reinterpret_cast<uintptr_t>(d) >> 4) * 31 +
                                            static_cast<uintptr_t>(g1 * m->ngeom + g2 + 1));
   ist_contact_patches_t patches = {};
@@ -451,30 +451,30 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   return 1;
 }
 
-/// MuJoCo marches along a ray by sdf_distance(), 40 steps at most, which misses what the ray
-/// grazes. After reset() the first point is the ray's origin and the second lies as far along it
-/// as the first distance: so the second answer is the rest of the way to the hit, and the third 0.
+/// MuJoCo marches along a ray by sdf_distance() with at most 40 steps, which misses grazing hits.
+/// After reset() the first point is the ray's origin, and the second is as far along it as the
+/// first distance. So the second answer is the remaining distance to the hit, and the third is 0.
 struct March {
   const void* solid = nullptr;  ///< null: no march
   int step = 0;
   bool missed = false;
-  double way = 0;  ///< from the origin to the next point
+  double way = 0;  ///< distance from the origin to the next point
   mjtNum origin[3] = {}, target[3] = {}, normal[3] = {};
 };
 thread_local March march;
 
 bool near(double a, double b, double size) { return std::fabs(a - b) <= 1e-9 * (size + b); }
 
-/// Positive outside. A point is in the geom's own frame, and the answers too.
+/// Positive outside. Points and answers are in the geom's own frame.
 ist_surface_point_t find_nearest(const Instance& solid, const mjtNum x[3]) {
   ist_surface_point_t answer = {};
   if (ist_closest_point(&solid.local, x, 1, &answer, sizeof answer) >= 0) return answer;
   complain_once("ist.solid: a solid has no mesh: neither rays nor cloths meet it");
-  answer.distance = 2e6;  // MuJoCo takes 1e6 for a miss
+  answer.distance = 2e6;  // MuJoCo treats 1e6 as a miss
   return answer;
 }
 
-/// MuJoCo's search on a triangle asks again and again at its corners: answers are kept.
+/// MuJoCo's search on a triangle queries its corners again and again, so answers are cached.
 ist_surface_point_t nearest(const Instance& solid, const mjtNum x[3]) {
   struct Known {
     uint64_t number = 0;
@@ -541,7 +541,7 @@ void gradient(mjtNum out[3], const mjtNum x[3], const mjData* d, int i) {
   mju_copy3(out, nearest(solid, x).gradient);
 }
 
-/// Refuses what cannot be read: MuJoCo raises an error of its own after the warning.
+/// Refuses unreadable values: MuJoCo raises its own error after the warning.
 bool read_number(const mjModel* m, int i, const char* key, double& value) {
   const char* text = mj_getPluginConfig(m, i, key);
   if (text == nullptr || *text == 0) return true;
@@ -559,7 +559,7 @@ bool collides(const mjModel* m, int geom) {
   return paired;
 }
 
-/// The mesh of a geom as the model has it: in the frame of its file, with its scale.
+/// The mesh of a geom in the model: in the frame of its file, with its scale.
 Triangles mesh_of_model(const mjModel* m, int mesh) {
   Triangles out;
   const float* const v = m->mesh_vert + 3 * m->mesh_vertadr[mesh];
@@ -577,7 +577,7 @@ Triangles mesh_of_model(const mjModel* m, int mesh) {
   return out;
 }
 
-/// Loads the file, or bakes the model's own mesh where there is none, such as after a move.
+/// Loads the file, or bakes the model's own mesh if there is none, e.g. after a move.
 bool find_tree(const mjModel* m, const char* file, Instance& out) {
   ist_status_t status = IST_OK;
   if (file != nullptr && *file != 0) {
@@ -687,7 +687,7 @@ int init(const mjModel* m, mjData* d, int i) {
 }  // namespace
 
 mjPLUGIN_LIB_INIT(ist) {
-  // Of 4000000, 4.0.0, the last three digits are fixes, which change no type.
+  // In 4000000 (4.0.0) the last three digits are fixes, which change no type.
   if (mj_version() / 1000 != mjVERSION_HEADER / 1000) {
     mju_warning("ist.solid is for MuJoCo %d.%d; this is %d: it is not registered",
                 mjVERSION_HEADER / 1000000, mjVERSION_HEADER / 1000 % 1000, mj_version());
@@ -698,7 +698,7 @@ mjPLUGIN_LIB_INIT(ist) {
     return;
   }
   std::memcpy(before, mjCOLLISIONFUNC, sizeof before);
-  // A plane meets a solid where it meets its hull: MuJoCo's own function is exact.
+  // A plane meets a solid exactly where it meets its hull, so MuJoCo's own function is exact.
   for (int type = mjGEOM_PLANE + 1; type <= mjGEOM_SDF; ++type)
     mjCOLLISIONFUNC[type][mjGEOM_SDF] = collide;
   static const char* const kKeys[] = {"file", "patches", "measure", "scale"};
@@ -718,17 +718,17 @@ mjPLUGIN_LIB_INIT(ist) {
     delete reinterpret_cast<Instance*>(d->plugin_data[i]);
     d->plugin_data[i] = 0;
   };
-  // A ray begins with a call without state, and ends with one where it misses.
+  // A ray begins with a call without state, and ends with one if it misses.
   plugin.reset = [](const mjModel*, mjtNum* state, void* solid, int) {
     const bool ends = march.solid == solid && march.missed;
     march = {};
     if (state == nullptr && !ends) march.solid = solid;
   };
   plugin.compute = [](const mjModel*, mjData*, int, int) { march.solid = nullptr; };
-  // MuJoCo asks these for rays, cloths, touch grids and SDFs of other plug-ins.
+  // MuJoCo calls these for rays, cloths, touch grids and SDFs of other plug-ins.
   plugin.sdf_distance = distance;
   plugin.sdf_gradient = gradient;
-  // A mesh made by marching cubes would be these; an asset's is a file.
+  // These would build a mesh by marching cubes; the mesh of an asset is a file.
   plugin.sdf_staticdistance = [](const mjtNum x[3], const mjtNum*) -> mjtNum {
     return mju_norm3(x) - 0.5;
   };

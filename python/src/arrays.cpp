@@ -5,7 +5,7 @@
 namespace ist::python {
 namespace {
 
-/// `kinds`: letters of NumPy's dtype.kind that convert.
+/// `kinds`: letters of NumPy's dtype.kind that are converted.
 template <class T>
 Array<T> take_array(const py::handle& value, const std::string& name, const std::string& wanted,
                     const char* kinds, const char* type) {

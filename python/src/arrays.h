@@ -18,8 +18,8 @@
 
 #include "query/base/members.h"
 
-// Arguments and answers as arrays. What does not fit is a TypeError (dtype) or a ValueError
-// (shape, value) that names the argument, what it is and what was wanted.
+// Arguments and answers as arrays. Unsuitable arguments are a TypeError (dtype) or a ValueError
+// (shape, value) that names the argument, its type and the expected one.
 
 namespace ist::python {
 
@@ -39,19 +39,18 @@ inline std::string type_name_of(const py::handle& value) {
 
 using Shape = std::vector<std::size_t>;
 
-/// Memory of an argument, in C order, which stays as long as this.
+/// The memory of an argument, in C order, valid as long as this object.
 template <class T>
 using Array = py::ndarray<const T, py::c_contig, py::device::cpu>;
 using Doubles = Array<double>;
 using Integers = Array<std::int64_t>;
 using Floats = Array<float>;
 
-/// Real numbers. The argument's own memory if that holds them in C order, else a copy.
-/// `wanted`: for the message, "(n, 7)".
+/// Real numbers. The argument's own memory if it contains them in C order, else a copy. `wanted`:
+/// for the message, "(n, 7)".
 Doubles take_doubles(const py::handle& value, const std::string& name, const std::string& wanted);
 Floats take_floats(const py::handle& value, const std::string& name, const std::string& wanted);
 
-/// Whole numbers, likewise.
 Integers take_integers(const py::handle& value, const std::string& name, const std::string& wanted);
 
 /// "(3, 7)"
@@ -70,17 +69,17 @@ template <class T>
   throw value_error(name + ": shape " + text_of(shape_of(array)) + "; wanted " + wanted);
 }
 
-/// Refuses NaN and negative numbers, which no limit can be.
+/// Refuses NaN and negative numbers, which are not valid limits.
 double take_limit(double value, const char* name);
 
-/// Refuses more threads than a machine has. 0: all cores.
+/// Refuses more threads than the machine has. 0: all cores.
 unsigned take_threads(unsigned threads);
 
-/// Of three numbers.
+/// A vector of three numbers.
 Eigen::Vector3d take_vector(const py::handle& value, const char* name);
 
-/// A new array of shape `rows` + (`kEach`,), all zero, and where its data is. What nobody writes to
-/// is not touched: of a long one it takes no memory and no time.
+/// A new array of shape `rows` + (`kEach`,), all zero, and a pointer to its data. Memory that
+/// nobody writes to is not touched: in a long array it takes no memory and no time.
 template <class T, std::size_t kEach = 0>
 struct Column {
   static constexpr std::size_t kWidth = kEach > 0 ? kEach : 1;
@@ -99,7 +98,7 @@ struct Column {
     return Eigen::Map<Eigen::Matrix<T, static_cast<int>(kWidth), 1>>(row(i));
   }
 
-  /// What handed_out() gave, of another process too.
+  /// Restores the result of handed_out(), also from another process.
   static Column taken(const py::handle& given) {
     Column column;
     if (given.is_none()) return column;
@@ -130,7 +129,7 @@ struct Column {
       value = static_cast<Value>(*row(i));
   }
 
-  /// An array of NumPy, a number where it has no dimension; None where there is no column.
+  /// An array of NumPy, a number if it has no dimension; None if there is no column.
   py::object handed_out() const {
     if (data == nullptr) return py::none();
     if (shape.empty()) return py::cast(*data);
@@ -148,7 +147,7 @@ struct Column {
   std::shared_ptr<T> data;
 };
 
-/// Row i of columns that are named like an answer's members.
+/// Row i of columns named like an answer's members.
 template <class Columns, class Answer>
 void write_row(const Columns& columns, std::size_t i, const Answer& answer) {
   for_each_member([i](const auto& column, const auto& value) { column.write(i, value); }, columns,

@@ -128,8 +128,8 @@ struct Targeted {
   StopReason stop = StopReason::sphere_count;
 };
 
-/// Adds what bakes: bake(mesh, settings, callback, more…). `more`: py::arg of each; they come
-/// before the keywords that all have.
+/// Adds a bake function: bake(mesh, settings, callback, more…). `more`: py::arg of each; they
+/// precede the keywords common to all.
 template <class Made, class... Given, class... More>
 void add_bake(py::module_& module, const char* name, const char* doc, std::size_t usual_spheres,
               bool rounds,

@@ -26,7 +26,7 @@ double rounding_of_array(const py::object& array) {
                                                                                   : kFloat64;
 }
 
-/// Coordinates in float32 say so by their file or their array.
+/// The file or the array determines whether coordinates are float32.
 double rounding_of(const py::object& mesh) {
   if (py::isinstance<py::str>(mesh) || py::hasattr(mesh, "__fspath__"))
     return rounding_of_file(path_of(mesh));

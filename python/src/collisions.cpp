@@ -9,13 +9,13 @@
 #include "query/find_solid_box.h"
 #include "query/kernel/lens.h"
 
-// What ist.trimesh asks of many pairs at every call.
+// Queries of many pairs that ist.trimesh makes at every call.
 
 namespace ist::python {
 namespace {
 
-/// A lower bound of the distance of two placed assets [u]. Negative where they may overlap: minus
-/// the cube root of the volume that boxes and balls around them share. 0 where boxes share no more
+/// A lower bound of the distance of two placed assets [u]. Negative if they may overlap: minus the
+/// cube root of the volume that the boxes and balls around them share. 0 if boxes share no more
 /// than rounding.
 double nearness(const Row& row) {
   Bounds around[2];
@@ -24,7 +24,7 @@ double nearness(const Row& row) {
   const auto& [a, b] = around;
   const Eigen::Array3d between = (a.lower - b.upper).cwiseMax(b.lower - a.upper).array();
   const double balls = (a.centre - b.centre).norm() - a.radius - b.radius;
-  // (more than what placing a solid rounds)
+  // Exceeds the rounding of placing a solid.
   const double rounded = 1e-12 * (a.centre.cwiseAbs().maxCoeff() + b.centre.cwiseAbs().maxCoeff() +
                                   a.radius + b.radius);
   const double apart = std::max(between.max(0).matrix().norm(), balls) - rounded;

@@ -19,7 +19,7 @@ namespace {
 using gpu::check;
 using gpu::DeviceGuard;
 
-/// A function of the driver, which nothing is linked to, so that the module loads without one.
+/// A function of the driver, loaded at run time, so that the module loads without a driver.
 template <class Function>
 Function driver_function(const char* name, unsigned version) {
   void* found = nullptr;
@@ -36,11 +36,11 @@ void check_driver(CUresult result, const char* doing) {
     throw Error(std::string("GPU: ") + doing + ": driver error " + std::to_string(result));
 }
 
-/// Blocks that nobody owns any more, and the stream that frees them.
+/// Blocks without an owner, and the stream that frees them.
 ///
-/// Who read a block last, and on which stream, is not known, and the stream may be gone. So a block
-/// is freed in the order of all work of the device, not when it is dropped (a graph may be captured
-/// just then) but when the next one is asked for.
+/// The last reader of a block and its stream are unknown, and the stream may be gone. So a block is
+/// freed in the order of all work of the device, not when it is dropped (a graph may be captured
+/// then) but at the next allocation.
 class Dropped {
  public:
   void add(void* data) {
@@ -71,7 +71,7 @@ class Dropped {
     check_driver(recorded, "freeing unused answers");
   }
 
-  /// Of the process, never destroyed: blocks may outlive the interpreter.
+  /// One per process, never destroyed: blocks may outlive the interpreter.
   static Dropped& of(int device) {
     static std::mutex mutex;
     static auto* const all = new std::map<int, Dropped>;
@@ -172,7 +172,8 @@ int device_of(const void* memory) {
 }
 
 bool captures(int device, Stream stream) {
-  if (stream == legacy_stream()) return false;  // it cannot, and must not be asked while others do
+  if (stream == legacy_stream())
+    return false;  // it cannot, and must not be queried while others capture
   const DeviceGuard guard(device);
   cudaStreamCaptureStatus status = cudaStreamCaptureStatusNone;
   check(cudaStreamIsCapturing(stream, &status), "querying a stream's state");

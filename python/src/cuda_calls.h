@@ -6,9 +6,9 @@
 
 #include <ist/gpu.h>
 
-// What the module itself asks of CUDA, in order of the caller's streams; a build without CUDA has
-// other bodies. Errors are ist::Error. Streams are those that DLPack knows: 1 is the legacy default
-// one, 2 the thread's own.
+// The CUDA functions that the module itself uses, in order of the caller's streams; a build without
+// CUDA has other definitions. Errors are ist::Error. Streams are numbered as in DLPack: 1 is the
+// legacy default stream, 2 the thread's own.
 
 struct CUevent_st;
 
@@ -18,7 +18,7 @@ using Stream = CUstream_st*;
 
 inline Stream legacy_stream() { return reinterpret_cast<Stream>(std::uintptr_t{1}); }
 
-/// When all that a stream was given until now is done.
+/// The end of all work given to a stream so far.
 class Moment {
  public:
   Moment(int device, Stream stream);
@@ -28,17 +28,17 @@ class Moment {
 
   bool passed() const;
   void wait() const;               ///< on the host
-  void hold(Stream stream) const;  ///< the stream waits: what it is given from now on comes after
+  void hold(Stream stream) const;  ///< the stream waits: work given to it from now on comes after
 
  private:
   int device_;
   CUevent_st* event_ = nullptr;
 };
 
-/// Device memory for answers. Without `data`: memory that something else owns.
+/// Device memory for answers. Without `data`: memory with another owner.
 ///
-/// Whoever drops the last of its owners need not have waited for anything: it is free for others
-/// when all that the device had been given by the next allocate() is done.
+/// Its last owner need not wait before dropping it: others may use it once all work that the device
+/// had been given by the next allocate() is done.
 class Block {
  public:
   Block(int device, void* data) : device_(device), data_(data) {}
@@ -54,13 +54,13 @@ class Block {
   void* data_;
 };
 
-/// Usable by `stream` from now on.
+/// The result is usable by `stream` from now on.
 std::shared_ptr<Block> allocate(int device, std::size_t bytes, Stream stream);
 
-/// Sets so many bytes to zero, when the stream comes to it.
+/// Sets so many bytes to zero, in the stream's order.
 void clear(const Block& block, std::size_t bytes, Stream stream);
 
-/// `count` times the same number, for work that the stream is given while this lives.
+/// An array of `count` equal numbers, for work given to the stream during this object's lifetime.
 class Repeated {
  public:
   Repeated(int device, std::uint32_t number, std::size_t count, Stream stream);
@@ -76,13 +76,13 @@ class Repeated {
   void* data_ = nullptr;
 };
 
-/// The device whose memory this is; −1: of none.
+/// The device that owns this memory; −1: none.
 int device_of(const void* memory);
 
-/// Whether the stream's work goes into a graph, to be done later and often.
+/// True if the stream's work is captured into a graph.
 bool captures(int device, Stream stream);
 
-/// Once `moment` has passed; waits for it.
+/// Copies after `moment`, and waits for it.
 void copy_to_host(void* to, const void* from, std::size_t bytes, int device, const Moment& moment);
 
 }  // namespace ist::python::cuda

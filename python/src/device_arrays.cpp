@@ -42,7 +42,7 @@ std::string describe(const WantedArray& wanted, int device) {
   return text + ") on CUDA device " + std::to_string(device);
 }
 
-/// An array as its framework describes it.
+/// An array as described by its framework.
 struct Described {
   void* data = nullptr;
   ElementType type = {};
@@ -59,7 +59,7 @@ void check_device(const WantedArray& wanted, int device, int type, int id) {
   if (!of_cuda(type) || id != device) refuse_device(wanted, device, name_of_device(type, id));
 }
 
-/// Takes what is in a capsule out of it, where there is a tensor that a `Tensor` may be.
+/// Takes the tensor out of a capsule that may contain a `Tensor`.
 template <class Tensor>
 std::optional<Described> taken_out(const py::object& capsule, const WantedArray& wanted,
                                    int device) {
@@ -93,13 +93,13 @@ Described by_dlpack(const py::object& value, const WantedArray& wanted, int devi
       const bool unknown = error.matches(PyExc_TypeError) &&
                            std::string(error.what()).find("max_version") != std::string::npos;
       if (!unknown) throw;
-      capsule = export_by(py::arg("stream") = handle);  // of a framework that knows no versions
+      capsule = export_by(py::arg("stream") = handle);  // for frameworks without versions
     }
   } catch (py::python_error& error) {
     const std::string text = wanted.name + ": " + text_of(error.value());
     py::raise_from(error, PyExc_TypeError, "%s", text.c_str());
   }
-  // The version stands first in a tensor that has one.
+  // A versioned tensor begins with its version.
   constexpr const char* kVersioned = "dltensor_versioned";
   if (PyCapsule_IsValid(capsule.ptr(), kVersioned)) {
     const auto major =
@@ -112,7 +112,7 @@ Described by_dlpack(const py::object& value, const WantedArray& wanted, int devi
   throw type_error(wanted.name + ": its __dlpack__ does not return a tensor capsule");
 }
 
-/// Of typestr, at the place of DLPack's code.
+/// Letters of typestr, indexed by DLPack's codes.
 constexpr const char* kLetters = "iuf???b";
 
 std::optional<ElementType> type_of(const std::string& typestr) {
@@ -144,7 +144,7 @@ Described by_interface(const py::object& value, const WantedArray& wanted, int d
     array.strides = py::cast<std::vector<std::int64_t>>(strides);
     for (std::int64_t& stride : array.strides) stride = stride * 8 / type->bits;
   }
-  // What its maker still does to it, on which stream, is told from version 3 on.
+  // From version 3 on, the stream of the producer's pending work is stated.
   if (const py::object maker = entry("stream"); !maker.is_none()) {
     const auto theirs = reinterpret_cast<cuda::Stream>(py::cast<std::uintptr_t>(maker));
     if (theirs != stream) cuda::Moment(device, theirs).hold(stream);
@@ -235,7 +235,7 @@ py::object to_dlpack(const py::object& held, const py::object& stream,
       throw py::buffer_error(
           "a copy on another device is not supported; numpy() copies to the host");
   }
-  // −1: whoever asks sees to it that nothing is read before it is written.
+  // −1: the consumer ensures that nothing is read before it is written.
   if (!py::isinstance<py::int_>(stream) || py::cast<std::intptr_t>(stream) != -1)
     self.ready->hold(stream_of(stream));
   return py::cast(py::ndarray<py::array_api, py::device::cuda>(
@@ -249,7 +249,7 @@ std::string typestr_of(const ElementType& type) {
 }
 
 py::dict interface_of(const DeviceArray& self) {
-  // Our own stream may be gone by now; the default one never is.
+  // Our own stream may be gone by now; the default stream never is.
   self.ready->hold(cuda::legacy_stream());
   py::dict out;
   const bool empty = self.shape[0] == 0;
@@ -266,7 +266,7 @@ py::object to_numpy(const DeviceArray& self) {
   std::size_t bytes = self.type.bits / 8u;
   for (const std::size_t n : self.shape) bytes *= n;
   const Column<std::byte> memory({bytes});
-  const DeviceArray held = self;  // another thread may have it written again meanwhile
+  const DeviceArray held = self;  // another thread may overwrite it meanwhile
   {
     const py::gil_scoped_release released;
     cuda::copy_to_host(memory.data.get(), held.data, bytes, held.block->device(), *held.ready);

@@ -22,7 +22,6 @@ inline constexpr ElementType kInt32 = py::dtype<std::int32_t>();
 inline constexpr ElementType kUInt64 = py::dtype<std::uint64_t>();
 inline constexpr ElementType kInt64 = py::dtype<std::int64_t>();
 
-/// What an argument is to be.
 struct WantedArray {
   std::string name;                       ///< of the argument, for messages
   std::vector<ElementType> types;         ///< any of them
@@ -30,21 +29,21 @@ struct WantedArray {
   bool written = false;
 };
 
-/// An argument's memory, which stays as long as `keep` does.
+/// An argument's memory, valid as long as `keep`.
 struct LentArray {
   void* data = nullptr;  ///< null: no rows
   std::int64_t rows = 0;
-  std::shared_ptr<void> keep;  ///< to be dropped with the GIL held
+  std::shared_ptr<void> keep;  ///< must be dropped with the GIL held
 };
 
-/// Takes a view of an argument. What the argument's framework still does to it is done before what
-/// `stream` is given from now on.
+/// Takes a view of an argument. Pending work of the argument's framework on it precedes the work
+/// that `stream` is given from now on.
 ///
-/// What is no array of `device` in C order is a TypeError (kind, dtype, device) or a ValueError
-/// (shape, order).
+/// Anything other than an array of `device` in C order is a TypeError (kind, dtype, device) or a
+/// ValueError (shape, order).
 LentArray lend(const py::object& value, const WantedArray& wanted, int device, cuda::Stream stream);
 
-/// A part of a block, as an object of Python that any framework can take.
+/// A part of a block, as a Python object that any framework accepts.
 struct DeviceArray {
   std::shared_ptr<const cuda::Block> block;
   std::shared_ptr<const cuda::Moment> ready;
@@ -56,7 +55,7 @@ struct DeviceArray {
 /// The class of DeviceArray.
 void add_device_array(py::module_& module);
 
-/// Of None, a handle, or a stream of a framework; else TypeError.
+/// From None, a handle, or a framework's stream; else TypeError.
 cuda::Stream stream_of(const py::object& stream);
 
 }  // namespace ist::python

@@ -14,7 +14,7 @@
 namespace ist::python {
 namespace {
 
-/// A class of Python a kind of field, so that users see which one they hold.
+/// A Python class for a kind of shape, so that users see its kind.
 template <class Kind>
 struct OwnedKind : OwnedShape {
   OwnedKind(Kind kind, py::dict arguments, std::shared_ptr<const void> owner = nullptr)
@@ -27,7 +27,7 @@ py::class_<OwnedKind<Kind>, OwnedShape> add_kind(py::module_& module, const char
   return py::class_<OwnedKind<Kind>, OwnedShape>(module, name, doc);
 }
 
-/// Of all but grids and assets, which are large.
+/// The arguments except grids and assets, which are large.
 std::string text_of_arguments(const py::dict& arguments) {
   std::string text;
   for (const auto& [key, value] : arguments) {
@@ -42,7 +42,7 @@ std::string text_of_arguments(const py::dict& arguments) {
 
 using Arguments = std::initializer_list<std::pair<const char*, py::object>>;
 
-/// Refuses numbers that no query would take.
+/// Refuses numbers that queries reject.
 template <class Kind>
 OwnedKind<Kind> sound(Kind kind, const char* wanted, const Arguments& given,
                       std::shared_ptr<const void> owner = nullptr) {
@@ -52,7 +52,7 @@ OwnedKind<Kind> sound(Kind kind, const char* wanted, const Arguments& given,
   return {std::move(kind), std::move(arguments), std::move(owner)};
 }
 
-/// Refuses values that are not finite or beyond the ends, and grids that are too small.
+/// Refuses values that are not finite or out of range, and grids that are too small.
 void check_grid(const Floats& grid, const char* name, double lowest, double highest) {
   std::size_t count = 1;
   for (std::size_t k = 0; k < grid.ndim(); ++k) {

@@ -11,7 +11,7 @@ void refuse_given(const char* where, std::initializer_list<std::pair<const char*
 }
 
 void add_gpu(py::module_& package) {
-  // ist.gpu, since the package has its users' name meanwhile.
+  // The module is ist.gpu, since the package already has its final name.
   py::module_ module = package.def_submodule(
       "gpu",
       "Whether there is a GPU, and the answers of queries of ist.Solids on one: arrays that any "
@@ -31,7 +31,7 @@ void add_gpu(py::module_& package) {
   add_gpu_penetration(module);
   add_gpu_separation(module);
   add_gpu_scene(module);
-  // So that arguments can be tried where there is no device.
+  // For testing arguments without a device.
   module.def(
       "_lend",
       [](const py::object& value, const std::string& name, int width, bool written, int device) {

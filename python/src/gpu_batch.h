@@ -12,7 +12,7 @@
 #include "pair_queries.h"
 #include "penetration.h"
 
-// What all batches on a device share: arguments that describe pairs, columns of answers.
+// The common parts of all batches on a device: arguments that describe pairs, columns of answers.
 
 namespace ist::python {
 
@@ -25,7 +25,7 @@ struct DeviceColumn {
   std::size_t place;  ///< of its pointer among the answers
   bool of_patches;    ///< answers.most rows for each pair
 
-  /// Of a pair's part of the column. `to`: how it is asked.
+  /// The shape of a pair's part of the column. `to`: the query.
   template <class Answers>
   std::vector<std::int64_t> inner_shape(const Answers& to) const {
     std::vector<std::int64_t> shape;
@@ -40,11 +40,10 @@ struct DeviceColumn {
     std::memcpy(reinterpret_cast<std::byte*>(&to) + place, &data, sizeof data);
   }
 
-  /// Written where nobody says what is wanted.
+  /// Written by default.
   bool unasked() const { return name != "node_visits" && name != "sphere_pairs"; }
 };
 
-/// The columns of a kind of answers.
 template <class Answers>
 std::vector<DeviceColumn>& columns_of() {
   static std::vector<DeviceColumn> all;
@@ -95,14 +94,13 @@ std::size_t number_of(const std::string& name, const char* argument) {
                     names_of_columns<Answers>());
 }
 
-/// Answers as arrays, ours or those that were given, in the order of columns_of(); null: not
-/// wanted.
+/// Answers as arrays, newly allocated or given, in the order of columns_of(); null: not wanted.
 template <class Answers>
 struct DeviceAnswers {
   std::vector<py::object> column = std::vector<py::object>(columns_of<Answers>().size());
 };
 
-/// The arguments that describe pairs, as many rows as `poses` has.
+/// The arguments that describe pairs, with as many rows as `poses`.
 class PairArguments {
  public:
   PairArguments(const DeviceSides& sides, const GivenPair& given, cuda::Stream stream)
@@ -145,7 +143,6 @@ class PairArguments {
   std::vector<std::unique_ptr<cuda::Repeated>> repeated_;  // until the batch is launched
 };
 
-/// Which columns are wanted.
 template <class Answers>
 std::vector<bool> wanted_columns(const py::object& wanted) {
   std::vector<bool> asked;
@@ -158,14 +155,14 @@ std::vector<bool> wanted_columns(const py::object& wanted) {
   return asked;
 }
 
-/// Where the answers of a batch go.
+/// The destination of a batch's answers.
 template <class Answers>
 struct DevicePlaces {
   Answers to;
   DeviceAnswers<Answers> found;
 };
 
-/// Arrays of ours, all in one block. `blank`: how it is asked, without arrays.
+/// New arrays in a single block. `blank`: the query, without arrays.
 template <class Answers>
 DevicePlaces<Answers> new_columns(const Answers& blank, const std::vector<bool>& wanted,
                                   std::size_t count, int device, cuda::Stream stream) {
@@ -203,7 +200,6 @@ DevicePlaces<Answers> new_columns(const Answers& blank, const std::vector<bool>&
   return places;
 }
 
-/// The arrays that were given.
 template <class Answers>
 DevicePlaces<Answers> given_columns(const Answers& blank, const py::object& out, std::size_t count,
                                     int device, cuda::Stream stream,
@@ -235,7 +231,7 @@ DevicePlaces<Answers> given_columns(const Answers& blank, const py::object& out,
   return places;
 }
 
-/// Takes all arguments and launches a batch: launch(solids, pairs, workspace, answers, stream).
+/// Reads all arguments and launches a batch: launch(solids, pairs, workspace, answers, stream).
 /// `blank`: answers without arrays.
 template <class Answers, class Launch>
 py::object ask(const DeviceSides& sides, const GivenPair& pair, const GivenOutput& given,
@@ -262,7 +258,7 @@ py::object ask(const DeviceSides& sides, const GivenPair& pair, const GivenOutpu
   return py::cast(std::move(places.found));
 }
 
-/// The class of a kind of answers, all of whose columns are added. `doc`: of what they are.
+/// The class of a kind of answers, with all its columns. `doc`: its description.
 template <class Answers>
 void add_answers(py::module_& module, const char* name, const char* doc) {
   py::class_<DeviceAnswers<Answers>> type(

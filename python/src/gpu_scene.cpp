@@ -10,12 +10,12 @@
 #include "penetration.h"
 #include "solid_rows.h"
 
-// ist.gpu.Scene: a broad phase on a device, whose pairs are the arguments of a query there.
+// ist.gpu.Scene: a broad phase on a device, whose pairs are arguments of queries there.
 
 namespace ist::python {
 namespace {
 
-/// What find_pairs() returns: arrays of the scene.
+/// The result of find_pairs(): arrays of the scene.
 struct DevicePairs {
   py::object count, boxes_met, a, b, solid_a, solid_b, poses_a, poses, scales_a, scales, status;
 };
@@ -71,7 +71,7 @@ class DeviceScene {
   std::size_t bytes() const { return all_->scene.bytes(); }
 
  private:
-  /// What arrays need to live, without the solids: their last batch may hold the arrays.
+  /// The memory of arrays, without the solids, whose last batch may own the arrays.
   struct Memory {
     Memory(const GpuSolids& solids, const std::vector<GpuSceneBody>& bodies,
            const GpuSceneSettings& settings)
@@ -87,7 +87,7 @@ class DeviceScene {
   std::shared_ptr<const cuda::Moment> ready_;
 };
 
-/// A whole number of each body, or the same of all.
+/// One integer for each body, or one for all.
 void take_column(const py::object& value, const char* name, std::vector<GpuSceneBody>& bodies,
                  std::uint32_t GpuSceneBody::*member) {
   if (value.is_none()) return;

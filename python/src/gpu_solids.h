@@ -15,11 +15,11 @@
 #include "cuda_calls.h"
 #include "solids.h"
 
-// What batches on a device ask about.
+// The solids of batches on a device.
 
 namespace ist::python {
 
-/// Solids on a device, and what their batches work in.
+/// Solids on a device, and the workspaces of their batches.
 class DeviceSolids {
  public:
   DeviceSolids(const std::vector<GpuSolid>& solids, int device) {
@@ -32,35 +32,35 @@ class DeviceSolids {
   ~DeviceSolids() {
     if (in_flight_.empty()) return;
     const py::gil_scoped_release released;
-    in_flight_.back().done->wait();  // what they read is about to go
+    in_flight_.back().done->wait();  // their inputs are about to be freed
   }
 
   const GpuSolids& solids() const { return *solids_; }
 
-  /// Launches a batch after those before it, on whatever streams they were. Returns when it will
-  /// be done, or null where the stream's work goes into a graph.
+  /// Launches a batch after the previous ones, whatever their streams. Returns its completion, or
+  /// null if the stream is captured into a graph.
   ///
-  /// `lent`: what the batch reads and writes, kept until it is done. `batch`: launches it.
+  /// `lent`: the inputs and outputs of the batch, kept until it is done. `batch`: launches it.
   template <class Launch>
   std::shared_ptr<const cuda::Moment> launch(const GpuPairs& pairs, cuda::Stream stream,
                                              std::vector<std::shared_ptr<void>> lent,
                                              const Launch& batch) {
-    // Few pairs and many are cut up differently, in workspaces of their own: an answer does not
-    // depend on what was asked before.
+    // Small and large batches are split differently, so they have separate workspaces: an answer
+    // does not depend on earlier queries.
     GpuWorkspace& workspace =
         ready(workspaces_[pairs.count > kFewGpuPairs ? 1 : 0], pairs.count, 4096, stream,
               [](std::size_t most, const GpuSettings& on) { return new GpuWorkspace(most, on); });
     return in_order(stream, std::move(lent), [&] { batch(*solids_, workspace); });
   }
 
-  /// What exact batches of a pair_id keep from call to call.
+  /// Data that exact batches of a pair_id keep from call to call.
   GpuKept& kept(std::uint32_t pair_id, std::size_t pairs, cuda::Stream stream) {
     return ready(kept_[pair_id], pairs, 64, stream, [](std::size_t most, const GpuSettings& on) {
       return new GpuKept(most, 8192, on);
     });
   }
 
-  /// Likewise what works in no workspace.
+  /// The same for work without a workspace.
   template <class Launch>
   std::shared_ptr<const cuda::Moment> in_order(cuda::Stream stream,
                                                std::vector<std::shared_ptr<void>> lent,
@@ -81,12 +81,12 @@ class DeviceSolids {
     std::vector<std::shared_ptr<void>> lent;
   };
 
-  /// Device memory of batches that grows with them.
+  /// Device memory that grows with the batches.
   template <class Memory>
   struct Growing {
     std::unique_ptr<Memory> now;
     bool captured = false;
-    std::vector<std::unique_ptr<Memory>> before;  ///< in use by graphs, as long as these solids
+    std::vector<std::unique_ptr<Memory>> before;  ///< used by graphs, as long as these solids exist
   };
 
   /// Memory for so many pairs. make(most, settings) makes a larger one, for `least` or more.
@@ -114,7 +114,7 @@ class DeviceSolids {
   }
 
   std::unique_ptr<GpuSolids> solids_;
-  Growing<GpuWorkspace> workspaces_[2];             ///< of few pairs, and of many
+  Growing<GpuWorkspace> workspaces_[2];             ///< for small and large batches
   std::map<std::uint32_t, Growing<GpuKept>> kept_;  ///< by pair_id
   std::deque<Batch> in_flight_;
 };

@@ -13,7 +13,7 @@
 namespace ist::python {
 namespace {
 
-// Rows of vectors are what NumPy sees.
+// NumPy sees rows of vectors.
 static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
 static_assert(sizeof(std::array<std::uint32_t, 3>) == 3 * sizeof(std::uint32_t));
 
@@ -37,7 +37,7 @@ TriangleMesh mesh_of_arrays(const py::object& vertices, const py::object& triang
   return mesh;
 }
 
-/// (n, 3), read-only, on memory that `owner` holds.
+/// (n, 3), read-only, in memory that `owner` owns.
 template <class T, class Row>
 py::object view_of(const std::vector<Row>& rows, const py::object& owner) {
   return py::cast(py::ndarray<py::numpy, const T>(reinterpret_cast<const T*>(rows.data()),
@@ -50,7 +50,7 @@ Eigen::Vector3d factors_of(const py::object& scale) {
                                      : take_vector(scale, "scale");
 }
 
-/// The solid that a mesh bounds.
+/// The solid bounded by a mesh.
 ClosedMesh close(TriangleMesh mesh, const std::string& name, bool repair,
                  const Eigen::Vector3d& factors) {
   scale_mesh(mesh, factors);
@@ -62,7 +62,7 @@ bool is_path(const py::object& value) {
   return py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__");
 }
 
-/// load_mesh(), whose notes are warnings of Python.
+/// load_mesh(), with notes as Python warnings.
 std::shared_ptr<TriangleMesh> loaded(const std::string& path, const ImportSettings& settings) {
   auto mesh = offline([=](const ProgressCallback&) {
     return std::make_shared<TriangleMesh>(load_mesh(path, settings));
@@ -112,7 +112,7 @@ std::shared_ptr<TriangleMesh> mesh_of(const py::object& value) {
   if (is_path(value)) return loaded(path_of(value), {});
   if ((py::isinstance<py::tuple>(value) || py::isinstance<py::list>(value)) && py::len(value) == 2)
     return std::make_shared<TriangleMesh>(mesh_of_arrays(value[0], value[1]));
-  // of trimesh, of Open3D, and of PyVista where all faces are triangles
+  // attributes of trimesh, Open3D, and PyVista if all faces are triangles
   for (const auto& [vertices, triangles] :
        {std::pair("vertices", "faces"), std::pair("vertices", "triangles"),
         std::pair("points", "regular_faces")})
@@ -139,7 +139,7 @@ std::shared_ptr<ClosedMesh> closed_of(const py::object& value, const py::object&
   });
 }
 
-/// (Mesh, (vertices, triangles)), for pickles; what a file declared is not in them.
+/// (Mesh, (vertices, triangles)) for pickles, without the frame that a file declared.
 static py::tuple remade(const py::object& mesh) {
   return py::make_tuple(py::module_::import_("ist").attr("Mesh"),
                         py::make_tuple(mesh.attr("vertices"), mesh.attr("triangles")));
@@ -192,7 +192,7 @@ void add_meshes(py::module_& module) {
       .def_prop_ro(
           "report", [](const ClosedMesh& mesh) { return mesh.report; }, "MeshReport, a copy.")
       .def("__reduce__", [](const py::object& self) {
-        // Closed again, by its arrays: the report is that of the mesh as it is.
+        // Closes the arrays again: the report describes the mesh as it is.
         const py::tuple mesh = remade(self);
         const py::module_ package = py::module_::import_("ist");
         const py::object again =

@@ -1,4 +1,4 @@
-// The Python module ist._core; package ist shows it to users (../ist/__init__.py).
+// The Python module ist._core, which package ist exposes (../ist/__init__.py).
 
 #include "module.h"
 
@@ -11,7 +11,7 @@
 
 namespace {
 
-/// A type, taken only where others may be converted: when no other overload took the arguments.
+/// A type that is converted only if no other overload accepted the arguments.
 struct LateType {
   ist::python::py::handle type;
 };
@@ -37,7 +37,7 @@ constexpr const char* kDoc = R"(Collision of solids by inner sphere trees.
 Lengths are [u], whatever unit the meshes have. Poses are rows qw, qx, qy, qz, tx, ty, tz of float64:
 x_world = R(q) (scale · x) + t.)";
 
-/// Adds to each class a constructor that is tried last: it raises TypeError that names the
+/// Adds to each class a constructor that is tried last and raises a TypeError that names the
 /// argument.
 void name_faults_of_constructors(const ist::python::py::module_& module) {
   namespace py = ist::python::py;
@@ -58,10 +58,10 @@ NB_MODULE(_core, module) {
   namespace python = ist::python;
   namespace py = python::py;
   module.attr("__doc__") = kDoc;
-  // Users know what is here by the package's name.
+  // Users know these objects under the package's name.
   const py::object own_name = module.attr("__name__");
   module.attr("__name__") = "ist";
-  py::set_leak_warnings(false);  // what is alive at the end is the system's to free
+  py::set_leak_warnings(false);  // the system frees objects that are alive at exit
   const py::exception<ist::Error> error(module, "Error", PyExc_RuntimeError);
   error.attr("__doc__") =
       "An error of the library. The message names the file, the place and the remedy.";

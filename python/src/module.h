@@ -7,7 +7,7 @@
 
 namespace ist::python {
 
-// Parts of the module, each in a file of its name.
+// Parts of the module, each in a file with its name.
 void add_meshes(py::module_& module);
 void add_assets(py::module_& module);
 void add_clash(py::module_& module);
@@ -24,7 +24,7 @@ void add_separation(py::module_& module);
 void add_surfaces(py::module_& module);
 void add_time_of_impact(py::module_& module);
 
-/// One of some words, else ValueError that lists them.
+/// An enumerator by its word, else ValueError that lists the words.
 template <class Enum, std::size_t kCount>
 Enum named(const std::string& word, const char* argument,
            const std::pair<const char*, Enum> (&choices)[kCount]) {

@@ -1,4 +1,5 @@
-// In a build without CUDA: nothing is on a device, so that nobody comes further than to be told.
+// A build without CUDA: no memory is on a device, so callers fail with an explanation before they
+// need one.
 #include <ist/types.h>
 
 #include "cuda_calls.h"

@@ -14,26 +14,25 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kLook = 50ms;       // for signals
-constexpr auto kPatience = 100ms;  // with a stage that was told to end
+constexpr auto kLook = 50ms;       // between checks for signals
+constexpr auto kPatience = 100ms;  // for a stage that was told to stop
 
-/// What Python sees.
 struct CallProgress : Progress {
   double total = 0;
 };
 
-/// What both threads see.
+/// Data shared by both threads.
 struct Job {
   std::mutex mutex;
   std::condition_variable changed;
   bool done = false;             // guarded, as are the next two
-  std::optional<Progress> news;  // not yet handed on
+  std::optional<Progress> news;  // not yet reported
   std::exception_ptr error;
   std::atomic<bool> cancelled = false;
 };
 
-/// Stages that run, those included that nobody waits for any more: the interpreter does not end
-/// before them.
+/// The number of running stages, including those that nobody waits for: the interpreter must not
+/// end before them.
 std::atomic<int>& running() {
   static auto* const count = new std::atomic<int>(0);  // outlives every thread
   return *count;
@@ -56,7 +55,7 @@ void work_apart(OfflineWork work, const std::shared_ptr<Job>& job) {
   } catch (...) {
     error = std::current_exception();
   }
-  work = nullptr;  // what it owns goes before its end is told
+  work = nullptr;  // its resources are released before its end is signalled
   {
     const std::lock_guard lock(job->mutex);
     job->done = true;
@@ -65,7 +64,7 @@ void work_apart(OfflineWork work, const std::shared_ptr<Job>& job) {
   }
 }
 
-/// Tells the stage to end, and gives it a little time.
+/// Tells the stage to stop, and waits briefly.
 void give_up(Job& job) {
   job.cancelled = true;
   const py::gil_scoped_release released;

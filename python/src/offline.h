@@ -10,20 +10,18 @@
 
 namespace ist::python {
 
-/// What runs on a thread of its own: it must own all that it uses, Python's objects excepted, of
-/// which it may use none.
+/// Work for a separate thread: it must own all its data, and must not use Python objects.
 using OfflineWork = std::function<void(const ProgressCallback&)>;
 
-/// Runs a long stage while the calling thread looks for Ctrl-C and hands on progress.
+/// Runs a long stage while the calling thread checks for Ctrl-C and reports progress.
 ///
-/// `progress` is called on the calling thread with a Progress; False from it cancels as the stage
-/// says, what it raises is raised.
-/// Its last call, once the work is done, says so. `rounds`: see WholeProgress.
-/// Ctrl-C raises KeyboardInterrupt within 0.2 s: the stage is told to end, and where it is in a
-/// step that cannot be cut short it ends unseen, after this call has returned.
+/// `progress` is called on the calling thread with a Progress; returning False cancels as
+/// documented for the stage, exceptions propagate. Its last call reports completion. `rounds`: see
+/// WholeProgress. Ctrl-C raises KeyboardInterrupt within 0.2 s: the stage is told to stop; if it is
+/// in a step that cannot be interrupted, it ends in the background after this call has returned.
 void run_offline(OfflineWork work, const py::object& progress, bool rounds = false);
 
-/// The same for work that answers.
+/// The same for work with a result.
 template <class Work>
 auto offline(Work work, const py::object& progress = py::none(), bool rounds = false) {
   using Answer = decltype(work(ProgressCallback()));
@@ -34,7 +32,7 @@ auto offline(Work work, const py::object& progress = py::none(), bool rounds = f
   return std::move(**answer);
 }
 
-/// Of a str or an os.PathLike.
+/// From a str or an os.PathLike.
 std::string path_of(const py::object& path);
 
 void add_offline(py::module_& module);

@@ -9,14 +9,14 @@
 
 namespace ist::python {
 
-/// Arguments of every such query, as they were given.
+/// The arguments common to all such queries, as given.
 struct GivenPair {
   const py::object &a, &b, &poses, &scales, &poses_a, &scales_a;
 
   Rows rows() const { return Rows::of_pair(a, b, poses, scales, poses_a, scales_a); }
 };
 
-/// Where the answers of a device go.
+/// The destination of a device's answers.
 struct GivenOutput {
   const py::object &wanted, &out, &stream;
 };
@@ -37,10 +37,10 @@ void add_pair_query(py::module_& module, const char* name,
       py::arg("scales_a") = py::none(), more...);
 }
 
-/// Refuses the first argument that is given where it has no effect.
+/// Refuses the first argument that is given without effect.
 void refuse_given(const char* where, std::initializer_list<std::pair<const char*, bool>> given);
 
-/// Refuses what only a device takes.
+/// Refuses arguments that only a device supports.
 inline void refuse_output(const GivenOutput& given) {
   refuse_given("for solids on a GPU only", {{"wanted", !given.wanted.is_none()},
                                             {"out", !given.out.is_none()},

@@ -18,24 +18,24 @@ void write_pose_gradient(const Pose& pose, const Eigen::Vector3d& by_translation
   const double norm = q.norm();
   const Eigen::Vector3d v = q.tail<3>() / norm;
   const double w = q[0] / norm;
-  // A rotation vector δ moves the unit quaternion by ½ (0, δ) q, a quarter of δ's length squared,
-  // so that the slope along the sphere is 2 (0, by_rotation) q. Across it there is none.
+  // A rotation vector δ moves the unit quaternion by ½ (0, δ) q, whose squared length is a quarter
+  // of δ's. So the slope along the sphere is 2 (0, by_rotation) q. Across it there is none.
   Eigen::Map<Eigen::Matrix<double, 7, 1>> gradient(out);
   gradient[0] = -2 * by_rotation.dot(v) / norm;
   gradient.segment<3>(1) = 2 / norm * (w * by_rotation + by_rotation.cross(v));
   gradient.tail<3>() = by_translation;
 }
 
-/// How the volume grows with the scales of B and A.
+/// The derivatives of the volume by the scales of B and A.
 struct ScaleGradient {
   double b = 0, a = 0;
 };
 
-/// No answer of a query holds B's: it is 3 V / scale where a ball of B lies in a larger one of A,
-/// and 0 where one of A lies in a larger one of B, with the same volume, centroid and gradients. So
-/// it is the difference of two queries, 0.05 % of the scale to either side, where rounding and
-/// curvature err alike, 2e-5 to 2e-4. The whole scene under a scale has its volume by the third
-/// power, which gives A's.
+/// No answer of a query determines the derivative by B's scale: it is 3 V / scale if a ball of B
+/// lies in a larger one of A, and 0 if one of A lies in a larger one of B, with the same volume,
+/// centroid and gradients. So it is the difference of two queries, 0.05 % of the scale to either
+/// side, where rounding and curvature cause similar errors, 2e-5 to 2e-4. The volume of the whole
+/// scene scales with the third power, which gives A's.
 ScaleGradient scale_gradient(const Row& row, const Penetration& answer,
                              const PenetrationSettings& settings, Workspace& workspace) {
   const double step = row.b.scale / 2048;
@@ -166,7 +166,7 @@ void add_class(py::module_& module) {
 
 void Penetrations::write(std::size_t i, const Row& row, const Penetration& answer) const {
   const bool touches =
-      answer.volume_max != 0 || answer.touching;  // else all is zero but the counts
+      answer.volume_max != 0 || answer.touching;  // else everything is zero except the counts
   for_each_member(
       [&]<class T, std::size_t kEach>(const Column<T, kEach>& column, const auto& value) {
         if (touches || std::is_integral_v<T>) column.write(i, value);

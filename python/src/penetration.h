@@ -19,16 +19,14 @@ namespace ist::python {
 
 inline constexpr std::pair<const char*, Measure> kMeasures[] = {
     {"matched", Measure::matched}, {"inner", Measure::inner}, {"exact", Measure::exact}};
-/// Of the spheres of an asset.
 inline constexpr std::pair<const char*, Measure> kSphereMeasures[] = {{"matched", Measure::matched},
                                                                       {"inner", Measure::inner}};
 
-/// Keywords that penetrations and contact patches share.
+/// The keywords common to penetrations and contact patches.
 ContactSettings contact_settings(const std::string& measure, bool spheres_only,
                                  std::uint32_t pair_budget, std::uint32_t max_visits,
                                  double relative_error, std::uint32_t pair_id);
 
-/// Penetrations as columns.
 struct Penetrations {
   Shape rows;
   Column<double> volume{rows}, volume_min{rows}, volume_max{rows};
@@ -38,13 +36,12 @@ struct Penetrations {
   Column<double, 3> contact_normal{rows};
   Column<std::uint32_t> status{rows}, node_visits{rows}, sphere_pairs{rows};
   Column<bool> touching{rows};
-  Column<double> scale_gradient{}, scale_gradient_a{};  ///< without an array where nobody asked
+  Column<double> scale_gradient{}, scale_gradient_a{};  ///< without an array unless requested
 
-  /// What was answered for row i, and how it grows with both poses.
+  /// Stores the answer of row i and its derivatives by both poses.
   void write(std::size_t i, const Row& row, const Penetration& answer) const;
 };
 
-/// Separations as columns.
 struct Separations {
   Shape rows;
   Column<double> distance{rows}, distance_min{rows}, distance_max{rows};
@@ -52,7 +49,6 @@ struct Separations {
   Column<std::uint32_t> status{rows}, node_visits{rows}, sphere_pairs{rows};
 };
 
-/// Times of impact as columns.
 struct Impacts {
   Shape rows;
   Column<double> time{rows}, distance_min{rows}, distance_max{rows};
@@ -60,7 +56,7 @@ struct Impacts {
   Column<std::uint32_t> kind{rows}, status{rows}, node_visits{rows}, surface_pairs{rows};
 };
 
-/// The parts of answers of a class that a pickle holds.
+/// The parts of answers of a class that a pickle contains.
 template <class Class>
 struct Pickled {
   struct Part {
@@ -98,7 +94,7 @@ void add_inner(py::class_<Class>& of, const char* name, std::shared_ptr<Inner> C
                                    }});
 }
 
-/// Answers go to other processes, when all their columns are there.
+/// Answers can be pickled if all their columns are present.
 template <class Class>
 void add_pickling(py::class_<Class>& of) {
   of.def("__getstate__", [](const Class& self) {

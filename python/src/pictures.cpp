@@ -10,7 +10,7 @@
 #include "penetration.h"
 #include "query/base/relative_pose.h"
 
-// What of assets and contacts is for pictures, and for who chooses how to ask.
+// Data of assets and contacts for drawing, and for choosing query settings.
 
 namespace ist::python {
 namespace {

@@ -33,7 +33,7 @@ Pose pose_from(const double* values) {
   return pose;
 }
 
-/// Scratch memory that calls take and give back: making it takes longer than a query.
+/// Scratch memory that calls reuse: creating it takes longer than a query.
 class Workspaces {
  public:
   std::vector<Workspace> take(std::size_t count) {
@@ -63,14 +63,14 @@ Workspaces& workspaces() {
   return all;
 }
 
-/// Looks for Ctrl-C now and then, on the thread that Python called on; others see what it found.
+/// Checks for Ctrl-C now and then, on the thread that Python called on; others see the result.
 class Interrupt {
  public:
   bool seen() {
     if (std::this_thread::get_id() == caller_ && ++calls_ % kCalls == 0 &&
         Clock::now() - last_ > std::chrono::milliseconds(50)) {
       const py::gil_scoped_acquire held;
-      if (PyErr_CheckSignals() != 0) seen_ = true;  // the exception waits in this thread's state
+      if (PyErr_CheckSignals() != 0) seen_ = true;  // the exception is kept in this thread's state
       last_ = Clock::now();
     }
     return seen_.load(std::memory_order_relaxed);
@@ -78,7 +78,7 @@ class Interrupt {
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr unsigned kCalls = 8;  // queries between two looks at the clock
+  static constexpr unsigned kCalls = 8;  // queries between two checks of the clock
 
   const std::thread::id caller_ = std::this_thread::get_id();
   unsigned calls_ = 0;
@@ -99,7 +99,7 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
   };
   if (is_field(rows.a_) && is_field(rows.b_))
     throw type_error("a, b: two shapes; one of them must be an Asset");
-  std::optional<std::size_t> count;  // as many rows as the arguments of many have
+  std::optional<std::size_t> count;  // the common number of rows of the arguments with many
   const auto agree = [&](const auto& array, const char* name) {
     if (count && array.shape(0) != *count)
       throw value_error(std::string(name) + ": " + std::to_string(array.shape(0)) +
@@ -163,8 +163,8 @@ Rows::Choice::Choice(const py::object& given, const char* name) : owner(given) {
 }
 
 void Rows::sort_by_asset() {
-  // Below, sorting takes longer than what it saves: 2 % of a batch over four assets, 6 to 9 % over
-  // 80 MB and more (benchmarks/run.sh cpu_batch).
+  // Below this, sorting costs more than it saves: 2 % of a batch over four assets, 6 to 9 % over 80
+  // MB and more (benchmarks/run.sh cpu_batch).
   constexpr std::uint64_t kCache = 32u << 20;
   constexpr std::size_t kFew = 64;  // rows
   if (a_.step + b_.step == 0 || count_ < kFew) return;
@@ -247,7 +247,7 @@ void refuse_unanswered(const Rows& rows, QueryStatus status, Measure asked) {
 }
 
 const char* write_pose(const double* matrix, double* row) {
-  constexpr double kRigid = 1e-6;  // how far a matrix may be from a rotation, each entry of RᵀR
+  constexpr double kRigid = 1e-6;  // tolerance of each entry of RᵀR for a rotation
   const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> m(matrix);
   const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
   if ((m.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() > kRigid)
@@ -261,7 +261,7 @@ const char* write_pose(const double* matrix, double* row) {
   if (!(off.cwiseAbs().array() <= kRigid).all())
     return "its columns are not of length 1 and at right angles";
   if (r.determinant() < 0) return "it mirrors";
-  // 4 q_k q, for each k: the longest of the four has no cancellation.
+  // 4 q_k q, for each k: the longest of the four avoids cancellation.
   const double x = r(0, 0), y = r(1, 1), z = r(2, 2);
   const double yz = r(2, 1) - r(1, 2), zx = r(0, 2) - r(2, 0), xy = r(1, 0) - r(0, 1);
   const double in_yz = r(2, 1) + r(1, 2), in_zx = r(0, 2) + r(2, 0), in_xy = r(1, 0) + r(0, 1);
@@ -324,7 +324,7 @@ void for_each_row(const Rows& rows, unsigned threads,
   bool interrupted = false;
   {
     const py::gil_scoped_release released;
-    constexpr std::size_t kFew = 8;  // rows that no second thread is called for
+    constexpr std::size_t kFew = 8;  // fewer rows are not worth a second thread
     const auto ask = [&](std::vector<Workspace>& scratch, const ParallelFor& parallel) {
       answer_all(count, scratch.size(), parallel, [&](std::size_t i, std::size_t worker) {
         if (!interrupt.seen()) answer(rows.asked(i), scratch[worker]);

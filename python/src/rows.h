@@ -12,7 +12,6 @@
 
 namespace ist::python {
 
-/// One of the solids of a row.
 struct Side {
   const Solid* solid = nullptr;
   Pose pose;
@@ -30,10 +29,10 @@ struct Row {
   Side a, b;
 };
 
-/// Poses and scales that are asked about: views of the arguments' memory, held here.
+/// Poses and scales of a query: views of the arguments' memory, owned here.
 class Rows {
  public:
-  /// B at each pose beside A. Arguments of one row serve all rows.
+  /// B at each pose relative to A. Arguments with one row apply to all rows.
   ///
   /// `a`, `b`: an Asset, a Shape, or SolidRows on the CPU. `poses`, `poses_a`: (7,), (n, 7), (4, 4)
   /// or (n, 4, 4); poses_a None: at the origin. `scales`, `scales_a`: a number or (n,), None: 1.
@@ -42,12 +41,12 @@ class Rows {
                       const py::object& scales, const py::object& poses_a,
                       const py::object& scales_a, const char* name = "poses");
 
-  const Shape& shape() const { return shape_; }  ///< of what is answered once a row
+  const Shape& shape() const { return shape_; }  ///< of results with one row per query
   std::size_t count() const { return count_; }
   Row at(std::size_t i) const;
 
-  /// The row that is asked i-th: pairs of the same assets one after another, where all of them
-  /// together are more than a cache holds.
+  /// The i-th row in the order of evaluation: pairs of the same assets are consecutive if all of
+  /// them together exceed the cache.
   std::size_t asked(std::size_t i) const { return order_.empty() ? i : order_[i]; }
 
  private:
@@ -64,7 +63,7 @@ class Rows {
     std::size_t step = 0;
   };
 
-  /// The solids of one side: one, or each row's.
+  /// The solids of one side: one, or one for each row.
   struct Choice {
     Choice() = default;
     Choice(const py::object& given, const char* name);
@@ -83,41 +82,41 @@ class Rows {
   std::size_t count_ = 0;
   Choice a_, b_;
   Values pose_a_, pose_b_, scale_a_, scale_b_;
-  std::vector<std::size_t> order_;  ///< of the rows; empty: as they come
+  std::vector<std::size_t> order_;  ///< of the rows; empty: unchanged
 
   void sort_by_asset();
 };
 
-/// Nobody looks at the status of one pose. Where that is all there is, throws Error, with the way
-/// out, if a solid does not hold what was asked, and ValueError that names the argument if it is
-/// invalid.
+/// The status of a single pose is not returned. Throws Error, with a remedy, if a solid lacks the
+/// requested data, and ValueError that names the argument if it is invalid.
 void refuse_unanswered(const Rows& rows, QueryStatus status, Measure asked = Measure::matched);
 inline void refuse_unanswered(const Rows& rows, const Column<std::uint32_t>& status,
                               Measure asked = Measure::matched) {
   if (rows.shape().empty()) refuse_unanswered(rows, QueryStatus{*status.row(0)}, asked);
 }
 
-/// What makes a pose or a scale unusable, with the argument's name; nothing if they are usable.
+/// The fault that makes a pose or a scale unusable, with the argument's name; nothing if they are
+/// usable.
 std::string fault_of(const Pose& pose, double scale, const char* pose_name, const char* scale_name);
 
-/// The same of two placed solids, beside each other too. `name`: of B's pose.
+/// The same for two placed solids, including their relative pose. `name`: of B's pose.
 std::string fault_of(const Row& row, const char* name = "poses");
 
-/// Row qw, qx, qy, qz, tx, ty, tz of a matrix (4, 4), NaN where it holds one; or why that is no
-/// rigid motion.
+/// Row qw, qx, qy, qz, tx, ty, tz of a matrix (4, 4), NaN if it contains one; or the reason why it
+/// is not a rigid motion.
 const char* write_pose(const double* matrix, double* row);
 
-/// (…, 7) of (…, 4, 4); ValueError that names the first that is no rigid motion.
+/// (…, 7) from (…, 4, 4); ValueError that names the first that is not a rigid motion.
 Column<double> rows_of_matrices(const Doubles& matrices, const std::string& name);
 
-/// Rows of seven numbers, of such or of matrices (4, 4).
+/// Rows of seven numbers, from such rows or from matrices (4, 4).
 Doubles take_poses(const py::handle& value, const char* name, const std::string& wanted);
 
-/// Of (7,) or (4, 4); None: at the origin. Refuses what no query takes, the scale too.
+/// From (7,) or (4, 4); None: at the origin. Refuses poses and scales that queries reject.
 Pose take_pose(const py::object& pose, double scale, const std::string& name = "pose");
 
-/// answer(i, workspace) for each row, on `threads` threads (0: all cores), the GIL released.
-/// Ctrl-C ends it: KeyboardInterrupt.
+/// Calls answer(i, workspace) for each row, on `threads` threads (0: all cores), with the GIL
+/// released. Ctrl-C ends it: KeyboardInterrupt.
 void for_each_row(const Rows& rows, unsigned threads,
                   const std::function<void(std::size_t, Workspace&)>& answer);
 

@@ -33,7 +33,6 @@ struct PyScene {
   std::map<std::uint32_t, py::object> owners;
 };
 
-/// One step's pairs as columns.
 struct SceneAnswers {
   Shape rows;
   Column<std::uint32_t, 2> pairs{rows}, ended{};
@@ -44,7 +43,7 @@ struct SceneAnswers {
   std::shared_ptr<Impacts> impact{};
 };
 
-/// What rays and points find, and of which bodies.
+/// The hits of rays and points, with their bodies.
 struct SceneHits {
   Shape rows;
   Column<std::uint32_t> number{rows};
@@ -63,7 +62,7 @@ Pose pose_at(const double* row) {
   return pose;
 }
 
-/// The bodies that `count` rows of `name` are for: `numbers`, or all that move, by number.
+/// The bodies for the `count` rows of `name`: `numbers`, or all moving ones, by number.
 std::vector<std::uint32_t> bodies_of(const PyScene& self, const std::size_t count,
                                      const std::string& name, const py::object& numbers) {
   std::vector<std::uint32_t> of;
@@ -234,7 +233,7 @@ std::unique_ptr<PyScene> replay(const py::bytes& record, const py::object& asset
   auto out = std::make_unique<PyScene>(
       Scene::replay({reinterpret_cast<const std::byte*>(record.c_str()), record.size()}, trees,
                     workers_of(threads)));
-  // Any of the assets may be whose memory a body reads.
+  // A body may refer to the memory of any of the assets.
   for (const std::uint32_t number : out->scene.numbers()) out->owners[number] = given;
   if (!out->owners.empty()) out->next = out->owners.rbegin()->first + 1;
   return out;
@@ -370,7 +369,7 @@ void add_scenes(py::module_& module) {
           py::arg("lower"), py::arg("upper"),
           "(k,) uint32: bodies whose boxes meet the box from lower to upper (3,) [u].")
       .def(
-          "_step_pairs",  // for ist.trimesh: (2, n), the pairs of a step alone
+          "_step_pairs",  // for ist.trimesh: (2, n), only the pairs of a step
           [](PyScene& self, const py::object& poses, const py::object& numbers) {
             const SceneStep found = ask_step(self, poses, numbers);
             const std::size_t count = found.pairs.size();

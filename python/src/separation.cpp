@@ -12,7 +12,7 @@
 namespace ist::python {
 namespace {
 
-/// Patches of a batch on a device, and whether it was well asked.
+/// Patches of a batch on a device, and a flag for invalid queries.
 struct GpuPatches : GpuContactPatches {
   QueryStatus* status = nullptr;
 };
@@ -88,7 +88,7 @@ std::unique_ptr<Outline> outline(const Rows& rows, std::size_t each,
     const Row row = rows.at(i);
     const auto ask = [&]() -> OverlapOutline {
       const AssetView *const a = row.a.tree(), *const b = row.b.tree();
-      if (a == nullptr || b == nullptr)  // a Shape holds no mesh
+      if (a == nullptr || b == nullptr)  // a Shape has no mesh
         return {contact_patches(row.a.placed(), row.b.placed(), settings, workspace, patches), 0};
       return overlap_outline({*a, row.a.pose, row.a.scale}, {*b, row.b.pose, row.b.scale}, settings,
                              workspace, patches, segments);

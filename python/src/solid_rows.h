@@ -7,19 +7,18 @@
 #include "gpu_solids.h"
 #include "solids.h"
 
-// Solids that rows of pairs choose from, where their answers are wanted.
+// Solids indexed by rows of pairs, in the memory where their answers are needed.
 
 namespace ist::python {
 
-/// ist.Solids.
 struct Solids {
   Solids(const py::sequence& solids, const std::string& device);
 
   std::string device() const;
 
   std::size_t count;
-  std::vector<std::size_t> shapes;  ///< which of them are Shapes
-  // On the CPU, with whoever owns what they view:
+  std::vector<std::size_t> shapes;  ///< the indices of Shapes
+  // On the CPU, with the owners of their memory:
   std::vector<Solid> views;
   std::vector<py::object> owners;
   std::unique_ptr<DeviceSolids> on_device;  ///< null: on the CPU
@@ -28,7 +27,7 @@ struct Solids {
 /// ist.Solids[index].
 struct SolidRows {
   py::object solids;  ///< Solids
-  py::object index;   ///< a number for all rows, or an array of each row's
+  py::object index;   ///< a number for all rows, or an array with one for each
 
   Solids& among() const { return py::cast<Solids&>(solids); }
 };
@@ -39,10 +38,9 @@ struct DeviceSides {
   py::object a, b;  ///< indices
 };
 
-/// Refuses one solid on a device beside one that is elsewhere.
+/// Refuses one solid on a device and the other elsewhere.
 DeviceSides device_sides(const py::object& a, const py::object& b);
 
-/// The classes of both.
 void add_solid_rows(py::module_& module);
 
 }  // namespace ist::python

@@ -10,23 +10,23 @@
 
 namespace ist::python {
 
-/// A shape and whoever owns the memory that it points to.
+/// A shape and the owner of its memory.
 struct OwnedShape {
   ist::Shape shape;
-  py::dict arguments;  ///< that it was made of
+  py::dict arguments;  ///< that it was constructed from
   std::shared_ptr<const void> owner;
 };
 
-/// What may stand first in a query: a view. Whoever asks holds the Python object meanwhile.
+/// The first argument of a query: a view. The caller keeps the Python object alive.
 using Solid = std::variant<AssetView, ist::Shape>;
 
-/// Its mesh, (vertices, triangles); Error where there is none.
+/// Its mesh, (vertices, triangles); Error if there is none.
 py::tuple kept_mesh_of(const Asset& asset);
 
-/// Of an Asset or a Shape, else TypeError. `name`: of the argument.
+/// From an Asset or a Shape, else TypeError. `name`: of the argument.
 Solid solid_of(const py::handle& object, const char* name);
 
-/// Of an Asset, else TypeError that says why a shape will not do.
+/// From an Asset, else TypeError that explains why a shape is not accepted.
 AssetView tree_of(const py::handle& object, const char* name);
 
 }  // namespace ist::python

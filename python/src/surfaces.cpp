@@ -16,8 +16,8 @@ PlacedSolid placed_alone(const py::object& solid, const py::object& pose, double
   return Side{&view, take_pose(pose, scale), scale}.placed();
 }
 
-/// ask(placed, i) for each place of `shape`, the GIL released. Where the solid does not hold what
-/// is asked, nothing is answered. One invalid place is a ValueError.
+/// Calls ask(placed, i) for each place of `shape`, with the GIL released. If the solid lacks the
+/// required data, nothing is answered. A single invalid place is a ValueError.
 template <class Ask>
 void ask_places(const PlacedSolid& placed, const Shape& shape, const char* places, const Ask& ask) {
   bool held = true, valid = true;

@@ -39,7 +39,7 @@ struct Places {
   std::size_t count = 0;
 };
 
-/// Of rays: one origin or direction serves all of the other.
+/// The shape of ray answers: one origin or direction applies to all of the other.
 inline const Shape& rows_of(const Places& origins, const Places& directions) {
   if (!origins.rows.empty() && !directions.rows.empty() && origins.count != directions.count)
     throw value_error("directions: " + std::to_string(directions.count) + " rows; origins have " +

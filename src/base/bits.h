@@ -8,7 +8,7 @@
 
 namespace ist {
 
-inline constexpr std::uint32_t kNoIndex = 0xFFFFFFFFu;  ///< the number of nothing
+inline constexpr std::uint32_t kNoIndex = 0xFFFFFFFFu;  ///< marks a missing index
 
 IST_HD inline std::uint32_t bits_of(float x) {
   std::uint32_t bits;
@@ -22,7 +22,7 @@ IST_HD inline float float_of(std::uint32_t bits) {
   return x;
 }
 
-/// The bits of a float as an integer of the same order.
+/// Maps a float to an integer of the same order.
 IST_HD inline std::uint32_t ordered_bits(float x) {
   const std::uint32_t bits = bits_of(x);
   return bits ^ ((bits >> 31) != 0 ? 0xFFFFFFFFu : 0x80000000u);
@@ -32,7 +32,7 @@ IST_HD inline float from_ordered_bits(std::uint32_t ordered) {
   return float_of(ordered ^ ((ordered >> 31) != 0 ? 0x80000000u : 0xFFFFFFFFu));
 }
 
-/// The bits of a double as an integer of the same order.
+/// Maps a double to an integer of the same order.
 IST_HD inline std::uint64_t ordered_bits(double x) {
   std::uint64_t bits;
   std::memcpy(&bits, &x, sizeof bits);
@@ -55,7 +55,7 @@ IST_HD inline int count_bits(std::uint64_t bits) {
   return IST_GPU_OR_HOST(__popcll(bits), std::popcount(bits));
 }
 
-/// The number of the lowest bit that is set. `bits` must not be 0.
+/// The index of the lowest set bit. `bits` must not be 0.
 IST_HD inline int lowest_bit(std::uint32_t bits) {
   return IST_GPU_OR_HOST(__ffs(static_cast<int>(bits)) - 1, std::countr_zero(bits));
 }
@@ -64,7 +64,7 @@ IST_HD inline int lowest_bit(std::uint64_t bits) {
   return IST_GPU_OR_HOST(__ffsll(static_cast<long long>(bits)) - 1, std::countr_zero(bits));
 }
 
-/// The numbers of the bits that are set, the lowest first; its own iterator.
+/// The indices of the set bits, the lowest first; its own iterator.
 template <class Word>
 struct SetBits {
   Word left;

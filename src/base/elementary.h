@@ -14,12 +14,12 @@ IST_HD inline double smooth_step(double t) noexcept {
   return t * t * (3 - 2 * t);
 }
 
-/// Its slope, 0 ≤ t ≤ 1.
+/// The slope of smooth_step(), 0 ≤ t ≤ 1.
 IST_HD inline double smooth_slope(double t) noexcept { return 6 * t * (1 - t); }
 
-// From double to float on a chosen side, the same bits on host and device.
+// Conversions from double to float with directed rounding, the same bits on host and device.
 
-/// Above the rounding of any distance in the unit frame, in double.
+/// Exceeds the rounding of any distance in the unit frame, in double.
 constexpr double kDistanceMargin = 1e-12;
 
 /// Largest float not above x.
@@ -37,7 +37,7 @@ IST_HD inline float rounded_up(double x) { return -rounded_down(-x); }
 inline float padded_up(double x) { return rounded_up(x + x * 1e-12); }
 
 /// atan2(y, x) [rad] within 1e-15, 0 for the origin. The C library's may differ between processors;
-/// this is of + − × ÷ and square roots alone.
+/// this uses only + − × ÷ and square roots.
 IST_HD inline double angle_of(double y, double x) {
   constexpr double kHalfTurn = std::numbers::pi;
   const double ax = x < 0 ? -x : x, ay = y < 0 ? -y : y;
@@ -57,14 +57,14 @@ IST_HD inline double angle_of(double y, double x) {
   return y < 0 ? -angle : angle;
 }
 
-/// x^(3/8) from square roots alone, x ≥ 0: the same bits everywhere, as pow() is not.
+/// x^(3/8) from square roots alone, x ≥ 0: the same bits everywhere, unlike pow().
 IST_HD inline double power_three_eighths(double x) {
   const double quarter = std::sqrt(std::sqrt(x));
   return quarter * std::sqrt(quarter);
 }
 
 /// Cube root of x ≥ 0 to a few units in the last place, from + − × ÷ alone: the C library's cbrt
-/// differs between processors, and radii go into the asset (docs/design.md 3.3).
+/// differs between processors, and the asset stores radii (docs/design.md 3.3).
 IST_HD inline double cube_root(double x) {
   if (!(x > 0 && x < HUGE_VAL)) return x > 0 ? x : 0;
   double scale = 1;  // x in [1/8, 1) by powers of 8, exact

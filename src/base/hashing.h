@@ -5,7 +5,7 @@
 #include "base/bits.h"
 #include "base/vec3.h"
 
-// Names for things that no order of work can change: hashes of their coordinates' bits.
+// Names that do not depend on the order of work: hashes of the bits of coordinates.
 
 namespace ist {
 
@@ -17,7 +17,7 @@ IST_HD inline std::uint64_t mixed(std::uint64_t x) {  // the finaliser of SplitM
   return x ^ (x >> 31);
 }
 
-/// The lowest 21 bits, two zeros after each: for the codes of Morton's curve.
+/// The lowest 21 bits, each followed by two zeros, for codes of Morton's curve.
 inline std::uint64_t spread_bits(std::uint64_t v) {
   v = (v | v << 32) & 0x001f00000000ffffu;
   v = (v | v << 16) & 0x001f0000ff0000ffu;
@@ -26,7 +26,6 @@ inline std::uint64_t spread_bits(std::uint64_t v) {
   return (v | v << 2) & 0x1249249249249249u;
 }
 
-/// Hash of a point's bits.
 IST_HD inline std::uint32_t point_hash(Float3 point, std::uint64_t seed) {
   std::uint64_t hash = mixed(seed + 0x9E3779B97F4A7C15ull);
   hash = mixed(hash ^ (bits_of(point.x) | std::uint64_t{bits_of(point.y)} << 32));

@@ -1,10 +1,9 @@
 #pragma once
 
-// Functions shared by the CPU and the GPU backend carry IST_HD (docs/design.md 3.3); IST_HD_COLD
-// those that hardly ever run and must not cost their callers registers; IST_HD_ONCE those of which
-// the device is to have one copy, called: inlined wherever they are used they would overflow its
-// instruction cache, which costs more than the calls. IST_ROLLED goes before a short loop, for the
-// same reason.
+// IST_HD marks functions shared by the CPU and the GPU backend (docs/design.md 3.3). IST_HD_COLD
+// marks those that rarely run and must not cost their callers registers. IST_HD_ONCE marks those
+// that the device calls instead of inlining: inlined copies would overflow its instruction cache,
+// which costs more than the calls. IST_ROLLED keeps a short loop rolled for the same reason.
 #ifdef __CUDACC__
 #define IST_HD __host__ __device__
 #define IST_HD_COLD __host__ __device__ __noinline__ inline
@@ -15,15 +14,15 @@
 #define IST_HD_ONCE
 #endif
 
-// IST_GPU_OR_HOST(gpu, host): the one on a device, the other on the host.
+// IST_GPU_OR_HOST(gpu, host): `gpu` on a device, `host` on the host.
 #ifdef __CUDA_ARCH__
 #define IST_GPU_OR_HOST(gpu, host) gpu
 #else
 #define IST_GPU_OR_HOST(gpu, host) host
 #endif
 
-// The device's compiler sees which memory a pointer leads to only where the array itself is in
-// sight. This tells it, as a team's memory() does; loads then need no general addressing.
+// The device's compiler knows the memory space of a pointer only if the array itself is visible.
+// This function states it, as a team's memory() does, so that loads need no generic addressing.
 namespace ist {
 
 template <class T>

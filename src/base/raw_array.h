@@ -7,8 +7,8 @@
 
 namespace ist {
 
-/// An array whose items are left as they are, for threads to fill: to clear a large array first
-/// takes one thread as long as all of them take to fill it.
+/// An uninitialised array for threads to fill: clearing a large array first takes one thread as
+/// long as all threads take to fill it.
 template <class T>
 class RawArray {
   static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);

@@ -18,8 +18,8 @@
 
 namespace ist {
 
-/// Where a stage's threads run: `threads` of them, 0 = all cores, never more than TBB may run, of
-/// which it would warn on stderr.
+/// An arena for a stage's threads: `threads` of them (0 = all cores), but no more than TBB allows,
+/// since it would warn on stderr.
 inline oneapi::tbb::task_arena thread_arena(unsigned threads) {
   const std::size_t allowed = oneapi::tbb::global_control::active_value(
       oneapi::tbb::global_control::max_allowed_parallelism);
@@ -36,7 +36,7 @@ void for_each_index(std::size_t from, std::size_t to, std::size_t grain, const W
                             });
 }
 
-/// How many of 0 … count − 1 are so.
+/// The number of i in [0, count) for which is_so(i).
 template <class IsSo>
 std::size_t count_where(std::size_t count, const IsSo& is_so) {
   return oneapi::tbb::parallel_reduce(
@@ -48,7 +48,7 @@ std::size_t count_where(std::size_t count, const IsSo& is_so) {
       std::plus<>());
 }
 
-/// Which of 0 … count − 1 are so: few.
+/// The few i in [0, count) for which is_so(i).
 template <class IsSo>
 std::vector<std::uint32_t> indices_where(std::size_t count, const IsSo& is_so) {
   oneapi::tbb::concurrent_vector<std::uint32_t> found;
@@ -60,7 +60,7 @@ std::vector<std::uint32_t> indices_where(std::size_t count, const IsSo& is_so) {
   return sorted;
 }
 
-/// Does work on a thread of its own, whose loops have `threads` threads. The future waits for it.
+/// Runs work on a new thread, whose loops use `threads` threads. The future waits for it.
 template <class Work>
 std::future<std::invoke_result_t<Work>> do_aside(unsigned threads, Work work) {
   return std::async(std::launch::async, [threads, work = std::move(work)] {
@@ -68,20 +68,20 @@ std::future<std::invoke_result_t<Work>> do_aside(unsigned threads, Work work) {
   });
 }
 
-/// Asks `meanwhile` twenty times a second until a result is there.
+/// Calls `meanwhile` twenty times a second until a result is available.
 template <class Future, class Meanwhile>
 void wait_for(const Future& future, const Meanwhile& meanwhile) {
   while (future.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) meanwhile();
 }
 
-/// Ends work on other threads: loops look at it, and are left by a WorkStop::Stopped.
+/// Stops work on other threads: their loops check it, and end by throwing WorkStop::Stopped.
 class WorkStop {
  public:
   struct Stopped {};
 
   void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
   bool stopped() const noexcept { return stopped_.load(std::memory_order_relaxed); }
-  /// Throws Stopped once stop() was called.
+  /// Throws Stopped after stop() was called.
   void look() const {
     if (stopped()) throw Stopped();
   }
@@ -90,8 +90,8 @@ class WorkStop {
   std::atomic<bool> stopped_ = false;
 };
 
-/// A part of a bake that is done once, on threads of its own. Where the scope is left before its
-/// end, it is stopped and waited for.
+/// A part of a bake that runs once in the background. Its destructor stops unfinished work and
+/// waits for it.
 template <class Result>
 class Aside {
  public:
@@ -106,7 +106,8 @@ class Aside {
     if (!made_.valid()) made_ = do_aside(threads_, [this] { return work_(stop_); }).share();
   }
 
-  /// Starts it if nobody has; calls `meanwhile` twenty times a second. Throws what the work throws.
+  /// Starts the work unless it has started; calls `meanwhile` twenty times a second. Throws what
+  /// the work throws.
   Result wait(const std::function<void()>& meanwhile) {
     start();
     wait_for(made_, meanwhile);

@@ -19,7 +19,7 @@ IST_HD inline double clamped(double x, double low, double high) {
 inline constexpr double kBallVolume = 4 * std::numbers::pi / 3;
 IST_HD inline double ball_volume(double r) { return kBallVolume * (r * r * r); }
 
-/// Three doubles, for host and device code. Sums go from the left to the right.
+/// Three doubles, for host and device code. Sums run from left to right.
 struct Vec3 {
   double x, y, z;
 
@@ -46,7 +46,7 @@ IST_HD inline Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-// The same of arrays.
+// The same for arrays.
 IST_HD inline double dot(const double (&a)[3], const double (&b)[3]) {
   return dot(vec3(a), vec3(b));
 }

@@ -26,7 +26,7 @@ std::size_t count_components(const TriangleMesh& mesh, const EdgeTable& edges) {
   });
 }
 
-/// Vertices whose triangles do not all hang together by the edges there.
+/// Vertices whose triangles are not all connected by edges at the vertex.
 std::size_t count_nonmanifold_vertices(const TriangleMesh& mesh, const EdgeTable& edges) {
   DisjointSets corners(3 * mesh.triangles.size());
   const auto corner_at = [&](std::uint32_t side, std::uint32_t vertex) {
@@ -39,7 +39,7 @@ std::size_t count_nonmanifold_vertices(const TriangleMesh& mesh, const EdgeTable
       for (const std::uint32_t side : sides.subspan(1))
         corners.unite(corner_at(sides[0], v), corner_at(side, v));
   });
-  // Every fan is named by one of its corners.
+  // Each fan is identified by one of its corners.
   std::vector<std::uint32_t> fans(mesh.vertices.size(), 0);
   tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
     if (has_repeated_corner(mesh.triangles[t])) return;
@@ -50,7 +50,7 @@ std::size_t count_nonmanifold_vertices(const TriangleMesh& mesh, const EdgeTable
   return count_where(fans.size(), [&](std::size_t v) { return fans[v] > 1; });
 }
 
-/// All but self-intersections.
+/// Everything except self-intersections.
 MeshReport survey(const TriangleMesh& mesh, const EdgeTable& edges) {
   MeshReport report;
   report.vertices = mesh.vertices.size();
@@ -97,7 +97,7 @@ MeshReport survey(const TriangleMesh& mesh, const EdgeTable& edges) {
       "manifest repair = true, in C repair = 1, in C++ OpenMeshPolicy::repair");
 }
 
-/// Coordinates that were rounded until the shape was lost.
+/// Refuses coordinates that were rounded until the shape was lost.
 void refuse_unusable_coordinates(const std::string& name, MeshReport& report) {
   const double size = report.bounds.sizes().maxCoeff();
   const double offset = largest_coordinate(report.bounds);
@@ -131,7 +131,7 @@ void note_findings(MeshReport& report) {
 
 using Pairs = std::vector<std::array<std::uint32_t, 2>>;
 
-/// Pairs by the indices that triangles have once others, which are in no pair, are dropped.
+/// Renumbers pairs for the triangles that remain after dropping others, which are in no pair.
 void rename_triangles(const std::vector<std::uint32_t>& dropped, Pairs& pairs) {
   for (auto& pair : pairs)
     for (std::uint32_t& t : pair)
@@ -139,7 +139,7 @@ void rename_triangles(const std::vector<std::uint32_t>& dropped, Pairs& pairs) {
                                       dropped.begin());
 }
 
-/// Degenerate and coincident triangles (docs/design.md 3.6).
+/// Removes degenerate and coincident triangles (docs/design.md 3.6).
 void reduce(Surface& surface, std::optional<SelfIntersections>& met, MeshReport& report) {
   TriangleMesh& mesh = surface.mesh;
   if (report.degenerate_triangles > 0) {
@@ -158,7 +158,7 @@ void reduce(Surface& surface, std::optional<SelfIntersections>& met, MeshReport&
   surface.triangles_changed();
 }
 
-/// Makes the faces at every edge agree about the outside.
+/// Orients the faces at every edge consistently.
 void orient_faces(Surface& surface, const std::string& name, MeshReport& report) {
   TriangleMesh& mesh = surface.mesh;
   const auto corner = [&](std::uint32_t side) {
@@ -199,7 +199,7 @@ void orient_outward(Surface& surface, const std::string& name, MeshReport& repor
         " inside another: solid, not a cavity, because the winding number inside it is 1 or more");
 }
 
-/// Reports for correctly oriented shells what orient_outward() reports for others.
+/// Reports for correctly oriented shells the same as orient_outward() for others.
 void keep_facing(const Surface& surface, MeshReport& report) {
   const TriangleMesh& mesh = surface.mesh;
   const Shells shells = find_shells(mesh.triangles, surface.edges);
@@ -263,7 +263,7 @@ ClosedMesh close(TriangleMesh input, const std::string& name, OpenMeshPolicy pol
     keep_facing(surface, report);
   }
   if (report.repaired || mesh.triangles.size() != report.triangles) drop_unused(mesh);
-  // Dropped degenerate triangles never counted; other changes may add or remove intersections.
+  // Dropped degenerate triangles were never counted; other changes may add or remove intersections.
   std::optional<TwoMeshes> both;
   if (report.repaired) both.emplace(unrepaired, mesh);
   if (report.repaired && met && met->count == 0)

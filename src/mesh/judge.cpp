@@ -12,14 +12,14 @@
 namespace ist {
 namespace {
 
-constexpr int kOnLine = kWindingPoints;  ///< points on a line along x
-constexpr std::size_t kLines = 128;      ///< whose points are summed in order, a block
-constexpr std::size_t kFewest = 16;      ///< blocks of volume samples
-constexpr std::size_t kMostBlocks = 512;       ///< the same, where the solid fills little of its box
-constexpr double kEnough = 4096;         ///< samples in solid or winding number
-constexpr std::size_t kSurface = 8192;   ///< samples of a surface
+constexpr int kOnLine = kWindingPoints;   ///< points on a line along x
+constexpr std::size_t kLines = 128;       ///< a block sums the points of this many lines in order
+constexpr std::size_t kFewest = 16;       ///< blocks of volume samples
+constexpr std::size_t kMostBlocks = 512;  ///< the same, if the solid fills little of its box
+constexpr double kEnough = 4096;          ///< samples in solid or winding number
+constexpr std::size_t kSurface = 8192;    ///< samples of a surface
 
-/// Part of i·step after the point: multiples of the golden ratio's kin spread evenly.
+/// Fractional part of i·step: multiples of an irrational step are a low-discrepancy sequence.
 double spread(std::size_t i, double step) {
   const double x = 0.5 + static_cast<double>(i) * step;
   return x - std::floor(x);
@@ -32,16 +32,16 @@ Eigen::Vector3d cube_point(std::size_t i) {
 }
 
 struct VolumeSums {
-  double agreed = 0, all = 0;   ///< Σ w in the solid; points there and where w ≥ ½ besides
-  double solid = 0, wound = 0;  ///< points in the one, and where the other is ½ or more
+  double agreed = 0, all = 0;   ///< Σ w in the solid; points in either set
+  double solid = 0, wound = 0;  ///< points in the solid; points with w ≥ ½
 };
 
 VolumeSums operator+(const VolumeSums& a, const VolumeSums& b) {
   return {a.agreed + b.agreed, a.all + b.all, a.solid + b.solid, a.wound + b.wound};
 }
 
-/// The triangles of `outward` less those of `made`, which is closed: where both have most in
-/// common, few. Their winding number and that of `made` are the sum's. Nothing where they are many.
+/// The triangles of `outward` without those of `made`, which is closed: few if both have most in
+/// common. Their winding number plus that of `made` is that of `outward`. Nothing if they are many.
 std::optional<TriangleMesh> difference(const TriangleMesh& outward, const TriangleMesh& made,
                                        const TwoMeshes& both) {
   const std::vector<Triangle> of_outward = both.sorted(outward.triangles, false);
@@ -59,8 +59,8 @@ std::optional<TriangleMesh> difference(const TriangleMesh& outward, const Triang
   return rest;
 }
 
-/// Blocks of samples until there are enough of them in either. The winding number is that of
-/// `rest`, and of the solid where `add_solid` says so.
+/// Samples blocks until there are enough points in either set. The winding number is that of
+/// `rest`, plus the solid's if `add_solid`.
 std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
                                        const TriangleWinding& rest, bool add_solid,
                                        const MeshSolid& made) {
@@ -119,13 +119,13 @@ std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
   return blocks;
 }
 
-/// Distances from one surface, at points spread evenly over its area, to another.
+/// Distances from points spread evenly over a surface to another surface.
 struct Distances {
   double mean = 0, max = 0;  ///< [u]
   double near = 0;           ///< share of the area within `limit`
 };
 
-/// The part of `mesh` that has the closest points of some places. reach[i]: the distance from
+/// The part of `mesh` that contains the closest points of some places. reach[i]: the distance from
 /// places[i] to a corner of one of its triangles, or infinity.
 std::unique_ptr<MeshSolid> part_near(const TriangleMesh& mesh,
                                      const std::vector<Eigen::Vector3d>& places,
@@ -145,7 +145,7 @@ std::unique_ptr<MeshSolid> part_near(const TriangleMesh& mesh,
   return triangles_as_solid(std::move(part));
 }
 
-/// `shared`, `corners`: [triangle, vertex of `from`] 1 where `to`'s triangles have it too.
+/// `shared`, `corners`: [triangle, vertex of `from`] 1 if `to` has it too.
 Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& shared,
                     const std::vector<std::uint8_t>& corners, const TriangleMesh& to,
                     double limit) {
@@ -155,9 +155,9 @@ Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& s
     area += area_of(from.vertices, from.triangles[t]);
     area_to[t] = area;
   }
-  std::vector<std::size_t> apart;       // samples on triangles that `to` does not have
-  std::vector<Eigen::Vector3d> places;  // where these lie
-  std::vector<double> reach;            // from there to a corner that `to` has
+  std::vector<std::size_t> apart;       // samples on triangles that `to` lacks
+  std::vector<Eigen::Vector3d> places;  // their positions
+  std::vector<double> reach;            // their distances to a corner that `to` has
   for (std::size_t i = 0, t = 0; i < kSurface; ++i) {
     const double place = (static_cast<double>(i) + 0.5) / double{kSurface} * area;
     while (t + 1 < area_to.size() && area_to[t] < place) ++t;

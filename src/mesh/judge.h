@@ -11,7 +11,7 @@
 
 namespace ist {
 
-/// The triangles that two meshes share: with equal corners. On the caller's TBB threads.
+/// The triangles that two meshes share, with equal corners. Runs on the caller's TBB threads.
 class TwoMeshes {
  public:
   TwoMeshes(const TriangleMesh& a, const TriangleMesh& b) : first_of_b_(a.vertices.size()) {
@@ -24,8 +24,8 @@ class TwoMeshes {
     shared_of_b_ = shared(b.triangles, true, of_a_);
   }
 
-  /// The triangles of one of them by numbers of their corners that are the same where the
-  /// coordinates are, the smallest first.
+  /// The triangles of one of them by numbers of their corners, the smallest first. Corners with
+  /// equal coordinates have equal numbers.
   std::vector<Triangle> sorted(const std::vector<Triangle>& triangles, bool of_b) const {
     std::vector<Triangle> all(triangles.size());
     tbb::parallel_for(std::size_t{0}, all.size(),
@@ -35,17 +35,17 @@ class TwoMeshes {
   }
   const std::vector<Triangle>& of_b() const { return of_b_; }
 
-  /// [triangle] 1 where the other mesh has it too, facing either side.
+  /// [triangle] 1 if the other mesh has it too, with either orientation.
   const std::vector<std::uint8_t>& shared_of_a() const { return shared_of_a_; }
   const std::vector<std::uint8_t>& shared_of_b() const { return shared_of_b_; }
-  /// [vertex] 1 where it is a corner of the other's triangles.
+  /// [vertex] 1 if it is a corner of the other's triangles.
   std::vector<std::uint8_t> corners_of_a() const { return corners(of_b_, 0, first_of_b_); }
   std::vector<std::uint8_t> corners_of_b() const {
     return corners(of_a_, first_of_b_, number_.size());
   }
 
  private:
-  /// For the vertices [first, last): whether the triangles of the other mesh use them.
+  /// For the vertices [first, last): 1 if the triangles of the other mesh use them.
   std::vector<std::uint8_t> corners(const std::vector<Triangle>& others, std::size_t first,
                                     std::size_t last) const {
     std::vector<std::uint8_t> used(number_.size(), 0), result(last - first);
@@ -64,7 +64,8 @@ class TwoMeshes {
 
   std::vector<std::uint8_t> shared(const std::vector<Triangle>& triangles, bool of_b,
                                    const std::vector<Triangle>& sorted_others) const {
-    std::vector<std::uint32_t> first(number_.size() + 1, 0);  // of the others at their first corner
+    std::vector<std::uint32_t> first(number_.size() + 1,
+                                     0);  // of the others, by their first corner
     for (const Triangle& other : sorted_others) ++first[other[0] + 1];
     std::partial_sum(first.begin(), first.end(), first.begin());
     std::vector<std::uint8_t> has(triangles.size());
@@ -86,12 +87,12 @@ class TwoMeshes {
 /// Repaired meshes whose confidence is less are refused.
 constexpr double kLeastConfidence = 0.6;
 
-/// Fraction of the bounds' diagonal within which a repair counts as having kept the surface.
+/// Fraction of the bounds' diagonal within which a repair counts as preserving the surface.
 constexpr double kKept = 1e-4;
 
-/// Compares a closed mesh with the surface it was made of, whose triangles may face either side;
-/// see RepairQuality. `kept`: a fraction of the diagonal (kKept). `both`: made from the two meshes.
-/// Uses the caller's TBB threads; their number does not change the result.
+/// Compares a closed mesh with the surface that it was made from, whose triangles may have either
+/// orientation; see RepairQuality. `kept`: a fraction of the diagonal (kKept). `both`: made from
+/// the two meshes. Uses the caller's TBB threads; their number does not change the result.
 RepairQuality judge(const TriangleMesh& soup, const ClosedMesh& made, const TwoMeshes& both,
                     double kept);
 

@@ -87,7 +87,7 @@ TriangleMesh mesh_of(const SourceFile& file, PolygonMesh polygons, const ImportS
   return mesh;
 }
 
-/// Not read by a third party.
+/// True if this library reads the format itself.
 bool is_ours(const std::string& ending) {
   return ending == ".vdb" || std::any_of(kReaders.begin(), kReaders.end(),
                                          [&](const auto& one) { return ending == one.first; });
@@ -109,7 +109,7 @@ std::optional<std::vector<std::string>> files_of_mesh(const std::string& path) {
   const SourceFile source = read_source_file(path);
   try {
     for (std::string& beside : GltfDocument(source).files()) files.push_back(std::move(beside));
-  } catch (const std::exception&) {  // loading it will say why
+  } catch (const std::exception&) {  // loading it will report why
   }
   return files;
 }

@@ -22,7 +22,7 @@ constexpr double kTolerance = 1e-7;  ///< of an interval, relative to the boundi
 template <int N>
 using Values = Eigen::Array<double, N, 1>;
 
-/// Integrals, the volume's first.
+/// Integrals, starting with the volume.
 template <int N>
 struct Measured {
   Values<N> value = Values<N>::Zero(), error = Values<N>::Zero();
@@ -33,8 +33,8 @@ struct Measured {
   }
 };
 
-/// Adaptive integral of f over [a, b], whose values at both ends and in the middle are known:
-/// halves where the volume's is not linear, so that a step is found like a root.
+/// Adaptive integral of f over [a, b], given its values at both ends and in the middle. It halves
+/// intervals where the volume's integrand is not linear, so a step is found like a root.
 template <int N, class Function>
 Measured<N> integrate(const Function& f, double a, double b, const Values<N>& at_a,
                       const Values<N>& at_middle, const Values<N>& at_b, double tolerance,
@@ -85,8 +85,8 @@ Eigen::AlignedBox3d box_of(const MeshView& mesh) {
   return {points.rowwise().minCoeff(), points.rowwise().maxCoeff()};
 }
 
-/// Integrals of the excess: along x exactly, along y and z adaptively. The lines that are looked at
-/// in any case are drawn in one go; only where they find an excess is the hierarchy asked for more.
+/// Integrals of the excess: along x exactly, along y and z adaptively. The initial lines are
+/// intersected together; the hierarchy is needed only where they find an excess.
 class ExcessIntegral {
  public:
   ExcessIntegral(const MeshView& arrays, const HierarchyMaker& hierarchy)
@@ -190,7 +190,7 @@ using Eigen::Vector3d;
 
 constexpr double kRounding = 0x1p-53;
 
-/// Knuth's sum: what each addition loses is kept.
+/// Compensated summation (Knuth): keeps what each addition loses.
 template <int N>
 struct CompensatedSum {
   using Values = Eigen::Array<double, N, 1>;
@@ -209,7 +209,7 @@ struct CompensatedSum {
   Values value() const { return high + lost; }
 };
 
-/// Sums of terms, and of their magnitudes, on which rounding depends.
+/// Sums of terms, and of their magnitudes, which determine rounding.
 template <int N>
 struct Sum {
   CompensatedSum<N> terms;
@@ -228,7 +228,8 @@ struct Tetrahedron {
   double magnitude = 0;
 };
 
-/// Edges are differences of near points, almost exact: so is the volume, however thin.
+/// Edges are differences of near points, almost exact: so is the volume, however thin the
+/// tetrahedron.
 Tetrahedron tetrahedron(const MeshView& mesh, std::size_t t, const Vector3d& apex) {
   const Vector3d a = vertex(mesh, t, 0), b = vertex(mesh, t, 1), c = vertex(mesh, t, 2);
   const Vector3d u = b - a, v = c - a;
@@ -368,7 +369,7 @@ MeshMoments moments_near(const MeshView& mesh, MeshMoments moments, double dista
   // The added or missing volume lies in the slab and no further than the reach.
   const double slab = slab_volume(mesh, distance);
   const double reach = std::sqrt(squared_reach(mesh, moments.centre)) + distance;
-  // No less than this is the solid's volume; where nothing is left, its centre may be anywhere.
+  // The solid's volume is at least this; if it is not positive, the centre may be anywhere.
   const double sure = moments.volume - moments.volume_error - slab;
   moments.centre_error =
       sure > 0 ? std::min(reach, moments.centre_error + slab * reach / sure) : reach;

@@ -16,15 +16,16 @@
 namespace ist {
 namespace {
 
-/// How far to_unit() moves a point by rounding, at most; 0 only where it does not round.
+/// Bound on the distance by which to_unit() moves a point by rounding; 0 only if it does not round.
 double rounding_at(const UnitFrame& frame, double scale, const Eigen::Vector3d& x) {
   double off[3], largest = 0;
   for (int k = 0; k < 3; ++k) {
     const double difference = x[k] - frame.centre[k];
-    const double centre_part = difference - x[k];  // −centre, as far as it got in (Knuth's two-sum)
+    const double centre_part =
+        difference - x[k];  // the part of −centre that was added (Knuth's two-sum)
     const double tail =
         (x[k] - (difference - centre_part)) + (-frame.centre[k] - centre_part);  // exact
-    off[k] = std::abs(tail) / scale;  // by a power of two: exact but under the least number
+    off[k] = std::abs(tail) / scale;  // division by a power of two: exact unless it underflows
     if (tail != 0 || difference / scale * scale != difference)
       off[k] += std::numeric_limits<double>::denorm_min();
     largest = std::max(largest, off[k]);
@@ -57,7 +58,7 @@ std::uint64_t hash_mesh(const UnitFrame& frame, const RawArray<double>& vertices
 }
 
 /// Closest point by the double formula over every triangle, the smaller index among equals. The
-/// float hierarchy and the float distances only rule triangles out, with a margin for their error.
+/// float hierarchy and the float distances only exclude triangles, with a margin for their error.
 /// If nothing is closer than `limit`: distance = limit, triangle = kNoTriangle.
 ClosestPoint exact_closest_point(const MeshView& mesh, const Eigen::Vector3d& p, double limit) {
   const ExactReach reach(p.data());
@@ -92,7 +93,7 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) {
     throw Error(closed.name + ": no triangles, so it does not bound a solid");
   if (mesh.triangles.size() >= kBvhLeaf / 2)
     throw Error(closed.name + ": more than 2^30 triangles: simplify the mesh");
-  // Only what a triangle refers to counts; strays may lie anywhere, even at NaN.
+  // Only referenced vertices count; others may be anywhere, even at NaN.
   constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> place(mesh.vertices.size(), kUnused);
   tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
@@ -180,7 +181,7 @@ const MeshView& MeshSolid::view() const {
 }
 
 const MeshMoments& MeshSolid::unit_moments() const {
-  // One shell that does not meet itself winds around no point twice.
+  // A single shell without self-intersections winds around no point twice.
   oneapi::tbb::collaborative_call_once(moments_made_, [this] {
     const HierarchyMaker hierarchy = [this]() -> const MeshView& { return view(); };
     moments_ = may_overlap_ ? winding_set_moments(arrays_, meets_itself_, hierarchy)
@@ -215,7 +216,7 @@ double UnitFrame::scale() const { return std::ldexp(1.0, exponent); }
 UnitFrame unit_frame(const Eigen::AlignedBox3d& bounds) {
   if (bounds.isEmpty() || !bounds.min().allFinite() || !bounds.max().allFinite())
     throw Error("the bounding box is empty or not finite, so there is no solid");
-  // Halves first: the sum of two large coordinates may overflow.
+  // Halved first: the sum of two large coordinates may overflow.
   const Eigen::Vector3d half = bounds.max() / 2 - bounds.min() / 2;
   const double half_extent = half.maxCoeff();
   if (!(half_extent > 0)) throw Error("the bounding box has size 0, so there is no solid");

@@ -12,7 +12,6 @@
 
 namespace ist {
 
-/// Closest point of a triangle mesh.
 struct ClosestPoint {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< unit frame
   double distance = 0;                              ///< unit frame, ≥ 0
@@ -28,10 +27,10 @@ inline std::array<Eigen::Vector3d, 3> triangle_corners(const MeshView& mesh,
   return corners;
 }
 
-/// The solid of a closed mesh. All internals live in the unit frame, in double; view() adds float
+/// The solid of a closed mesh. All internal data is in the unit frame, in double; view() adds float
 /// copies for packing. Immutable; every function may be called from many threads at once. The
-/// hierarchy and the moments are made when they are first asked for, on the caller's TBB threads: a
-/// bake on the GPU never asks for the hierarchy.
+/// hierarchy and the moments are computed at the first use, on the caller's TBB threads: a bake on
+/// the GPU never needs the hierarchy.
 class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
  public:
   explicit MeshSolid(const ClosedMesh& mesh);
@@ -45,18 +44,18 @@ class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
   const MeshSolid* mesh() const noexcept override { return this; }
 
   const UnitFrame& frame() const { return frame_; }
-  double rounding() const { return rounding_; }  ///< unit frame: no vertex was moved further
+  double rounding() const { return rounding_; }  ///< unit frame: bound on a vertex's motion
   double unit_volume() const { return unit_moments().volume; }  ///< unit frame³
   const MeshMoments& unit_moments() const;
-  /// Unit frame: no vertex is further from where it would be without any rounding.
+  /// Unit frame: bound on the distance of any vertex from its place without any rounding.
   double moved() const { return moved_; }
-  /// Triangles of the mesh intersect, or may: they were not looked for. Not by rounding alone.
+  /// Triangles of the mesh intersect, or may (unknown), by more than rounding.
   bool meets_itself() const { return meets_itself_; }
   /// ClosedMesh::meeting_pairs if the unit frame rounded no coordinate, else null.
   const std::vector<std::array<std::uint32_t, 2>>* meeting_pairs() const {
     return meeting_pairs_ ? &*meeting_pairs_ : nullptr;
   }
-  /// It winds around some point twice, or may: several shells.
+  /// The mesh winds around some point twice, or may: it has several shells.
   bool may_overlap() const { return may_overlap_; }
   std::uint64_t hash() const;    ///< XXH3-64 of vertices and triangles
   const MeshView& view() const;  ///< plain arrays for host code, the hierarchy included
@@ -83,7 +82,7 @@ class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
   bool meets_itself_ = false, may_overlap_ = false;
   std::optional<std::vector<std::array<std::uint32_t, 2>>> meeting_pairs_;
 
-  // Made when first asked for.
+  // Computed at the first use.
   mutable oneapi::tbb::collaborative_once_flag hierarchy_made_, moments_made_, hash_made_;
   mutable std::uint64_t hash_ = 0;
   mutable Bvh bvh_;

@@ -18,10 +18,10 @@
 namespace ist {
 namespace {
 
-constexpr double kFar = 3;  ///< distance of what counts together over its radius
+constexpr double kFar = 3;  ///< distance of a group that is expanded, over its radius
 
-/// Lines of sight along each side of a view: some eight for the smallest patch, but for triangles
-/// that are alike at most two each.
+/// Lines of sight along each side of a view: some eight for the smallest patch, but at most two for
+/// each of many equal triangles.
 std::uint32_t lines_to_see(const TriangleMesh& soup, DisjointSets& patches) {
   std::vector<double> area(soup.triangles.size(), 0);
   double all = 0, least = HUGE_VAL;
@@ -55,7 +55,7 @@ struct Votes {
   std::int64_t fronts = 0, backs = 0;
 };
 
-/// Adds what is seen of each patch along one axis, which comes first in `points` (unit frame).
+/// Adds what is visible of each patch along one axis, which comes first in `points` (unit frame).
 void look_along(const std::vector<std::array<double, 3>>& points,
                 const std::vector<Triangle>& triangles, std::uint32_t lines, DisjointSets& patches,
                 std::vector<Votes>& votes) {
@@ -83,7 +83,6 @@ void look_along(const std::vector<std::array<double, 3>>& points,
       }
 }
 
-/// The vertices in the unit frame of the triangles.
 std::vector<Eigen::Vector3d> unit_vertices(const TriangleMesh& soup) {
   const UnitFrame frame = unit_frame(bounds_of(soup.vertices, soup.triangles));
   const double scale = frame.scale();
@@ -92,7 +91,7 @@ std::vector<Eigen::Vector3d> unit_vertices(const TriangleMesh& soup) {
   return unit;
 }
 
-/// Counts how far-away viewers along the three axes see each patch.
+/// Counts how often distant viewers along the three axes see each patch.
 std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches,
                         const std::vector<Eigen::Vector3d>& unit) {
   const std::uint32_t lines = lines_to_see(soup, patches);
@@ -116,8 +115,8 @@ std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches,
   return std::move(votes);
 }
 
-/// For each patch the volume between it and the middle of its area: > 0 where it bulges to its
-/// front. 0 where only rounding is left, as of a flat one.
+/// For each patch, the volume between it and the middle of its area: > 0 if it bulges to its front.
+/// 0 if only rounding is left, as of a flat one.
 std::vector<double> bulges(const TriangleMesh& soup, DisjointSets& patches,
                            const std::vector<Eigen::Vector3d>& unit) {
   struct Sum {
@@ -152,19 +151,19 @@ std::vector<double> bulges(const TriangleMesh& soup, DisjointSets& patches,
   return result;
 }
 
-/// Turns the triangles of a soup so that as many as possible show their fronts to the outside.
-/// Neighbours across edges of two triangles are made to agree, as far as the surface is orientable.
-/// A connected patch is then turned if viewers far away along the three axes see its back at least
-/// twice as often as its front. If neither prevails, as in a bowl, the front is the side it bulges
-/// to. Patches that nobody sees follow the majority: they stay as authored unless most of the
-/// visible surface had to be turned. Independent of the number of threads.
+/// Flips the triangles of a soup so that as many as possible face outward. Neighbours across edges
+/// of two triangles are made consistent, as far as the surface is orientable. A connected patch is
+/// then flipped if distant viewers along the three axes see its back at least twice as often as its
+/// front. If neither prevails, as for a bowl, the front is the convex side. Invisible patches
+/// follow the majority: they stay as authored unless most of the visible surface was flipped.
+/// Independent of the number of threads.
 void orient_soup(TriangleMesh& soup, const EdgeTable& edges) {
   make_consistent(soup.triangles, manifold_partners(edges));
   DisjointSets patches = connected_pieces(edges, 2);
   const std::vector<Eigen::Vector3d> unit = unit_vertices(soup);
   const std::vector<Votes> votes = look(soup, patches, unit);
   const std::vector<double> bulge = bulges(soup, patches, unit);
-  // Lines by which a patch shows its front more than its back, or as it bulges.
+  // Lines that see more of a patch's front than of its back, or its bulge.
   const auto in_favour = [&](std::uint32_t patch) {
     const auto [fronts, backs] = votes[patch];
     if (fronts > 2 * backs || backs > 2 * fronts || bulge[patch] == 0) return fronts - backs;
@@ -230,7 +229,7 @@ FarTriangles SoupWinding::far_of_block(std::uint32_t block) const {
   return far;
 }
 
-/// `place`: which child of `parent` it is; the parent's box bounds it.
+/// `place`: the child's index in `parent`, whose box bounds it.
 FarTriangles SoupWinding::far_of(std::uint32_t child, const BvhNode& parent, int place) {
   FarTriangles far;
   if ((child & kBvhLeaf) != 0) {

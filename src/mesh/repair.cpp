@@ -41,7 +41,7 @@ std::vector<BorderLoop> border_loops(const EdgeTable& edges) {
     while (!path.empty()) {
       auto& choices = at[path.back()];
       while (!choices.empty() && walked[choices.back()]) choices.pop_back();
-      // only the start of the walk has no next edge, once all its loops are closed
+      // Only the start of the walk has no next edge, once all its loops are closed.
       if (choices.empty()) {
         place[path.back()] = kNoIndex;
         path.pop_back();
@@ -55,7 +55,7 @@ std::vector<BorderLoop> border_loops(const EdgeTable& edges) {
         path.push_back(next);
         continue;
       }
-      // Back on the path: cut the loop off.
+      // Back on the path: cuts the loop off.
       const auto begin = path.begin() + place[next];
       loops.push_back({{begin, path.end()}, e});
       for (auto v = begin + 1; v != path.end(); ++v) place[*v] = kNoIndex;
@@ -82,8 +82,8 @@ std::vector<bool> border_vertices(const TriangleMesh& mesh, const EdgeTable& edg
   return border;
 }
 
-/// Splits border triangles at border vertices on their sides, one side a triangle: of `asked` ones,
-/// which become those that were split, and their pieces. Returns whether there was any to split.
+/// Splits border triangles at border vertices on their sides, one side a triangle. Of the triangles
+/// in `asked`, which becomes those that were split and their pieces. Returns true if it split any.
 bool split_once(Surface& surface, const BorderVertices& border, double tolerance,
                 std::vector<bool>& asked) {
   TriangleMesh& mesh = surface.mesh;
@@ -118,7 +118,7 @@ bool split_once(Surface& surface, const BorderVertices& border, double tolerance
 }
 
 /// Closes cracks: joins border vertices that lie within `tolerance` [u] of each other, and splits
-/// border triangles where a border vertex lies within it of their side (T-junctions). Interior
+/// border triangles if a border vertex lies within it of their side (T-junctions). Interior
 /// vertices stay. Border: edges with an odd number of sides.
 Surface stitch(const Surface& surface, double tolerance) {
   Surface result{weld_among(surface.mesh, tolerance, border_vertices(surface.mesh, surface.edges))};
@@ -138,7 +138,7 @@ void tidy(Surface& surface) {
   if (reduce_coincident(mesh.triangles, surface.edges) > 0) surface.triangles_changed();
 }
 
-/// The least tolerance up to `most` by which stitch() changes anything; infinity where none does.
+/// The least tolerance up to `most` with which stitch() changes anything; infinity if none does.
 double least_crack(const Surface& surface, double most) {
   const EdgeTable& edges = surface.edges;
   const BorderVertices border(surface.mesh, border_vertices(surface.mesh, edges));
@@ -150,7 +150,7 @@ double least_crack(const Surface& surface, double most) {
   return least;
 }
 
-/// Takes the smallest tolerance up to 1e-5 of the diagonal that leaves the fewest odd edges.
+/// Uses the smallest tolerance up to 1e-5 of the diagonal that leaves the fewest odd edges.
 void close_cracks(Surface& surface, MeshReport& report) {
   const double diagonal = report.bounds.diagonal().norm();
   const double least = least_crack(surface, kWidestCrack * diagonal);
@@ -175,7 +175,7 @@ void close_cracks(Surface& surface, MeshReport& report) {
                          " fewer");
 }
 
-/// How often each patch lies on an edge: patch, sides.
+/// The number of each patch's sides at an edge: patch, sides.
 std::vector<std::pair<std::uint32_t, std::uint32_t>> patches_at(
     DisjointSets& patches, std::span<const std::uint32_t> sides) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> counts;
@@ -192,10 +192,10 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> patches_at(
   return counts;
 }
 
-/// Patches connected by edges of two faces, named by their first triangles.
+/// Patches connected by edges of two faces, identified by their first triangles.
 struct HangingPatches {
   DisjointSets sets;
-  std::vector<int> gain;  ///< odd edges fewer without this patch
+  std::vector<int> gain;  ///< reduction of odd edges without this patch
   std::vector<std::vector<std::uint32_t>> shared_edges;
 
   HangingPatches(const TriangleMesh& mesh, const EdgeTable& edges)
@@ -213,16 +213,16 @@ struct HangingPatches {
   }
 };
 
-/// Whether there are edges of three and more faces: without any, nothing hangs on anything.
+/// True if there are edges of three and more faces: otherwise no patch is attached to another.
 bool any_crowded(const EdgeTable& edges) {
   for (std::size_t e = 0; e < edges.size(); ++e)
     if (edges.sides(e).size() > 2) return true;
   return false;
 }
 
-/// Drops patches that hang on others and leave fewer odd edges when they go, those first that leave
-/// the fewest for their area: a body with holes has many itself. What is right for one changes what
-/// is right for its neighbours, so those wait. Returns how many went.
+/// Drops patches attached to others if fewer odd edges are left without them, starting with those
+/// that leave the fewest for their area: a body with holes has many itself. Dropping one changes
+/// the decision for its neighbours, so those wait. Returns how many were dropped.
 std::size_t drop_fins_once(Surface& surface) {
   TriangleMesh& mesh = surface.mesh;
   const EdgeTable& edges = surface.edges;
@@ -265,7 +265,7 @@ std::size_t drop_fins(Surface& surface) {
   return total;
 }
 
-/// Gives each piece vertices of its own, so that no walk along a border leaves its piece.
+/// Duplicates vertices so that each piece has its own, and no walk along a border leaves its piece.
 void separate(Surface& surface, DisjointSets& pieces) {
   TriangleMesh& mesh = surface.mesh;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> copies;  // vertex, piece
@@ -287,8 +287,8 @@ void separate(Surface& surface, DisjointSets& pieces) {
   if (!copies.empty()) surface.triangles_changed();
 }
 
-/// Caps every loop of odd edges; but a piece that would be capped with nearly as much surface as it
-/// has is an open sheet, no solid with a hole, and is dropped.
+/// Caps every loop of odd edges. But a piece that would be capped with nearly as much surface as it
+/// has is an open sheet, not a solid with a hole, and is dropped.
 void cap_holes(Surface& surface, MeshReport& report) {
   constexpr double kSheet = 0.95;  // caps to own area
   TriangleMesh& mesh = surface.mesh;
@@ -369,7 +369,7 @@ std::size_t count_t_junctions(const TriangleMesh& mesh, const EdgeTable& edges) 
 }
 
 void repair(Surface& surface, const std::string& name, MeshReport& report) {
-  if (report.repaired) {  // by walls that went, which may have left copies
+  if (report.repaired) {  // dropped walls may have left copies
     Surface tidied{surface.mesh};
     tidy(tidied);
     if (count_odd_edges(tidied.edges) < count_odd_edges(surface.edges)) surface = std::move(tidied);

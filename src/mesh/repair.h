@@ -15,19 +15,19 @@ struct Surface {
 };
 
 /// Drops walls between parts of the solid that share them: patches at edges of three and more faces
-/// with solid on both sides, where fewer odd edges are left without them. Says so in the notes.
+/// with solid on both sides, if fewer odd edges are left without them. Adds a note.
 void drop_inner_walls(Surface& surface, MeshReport& report);
 
-/// Makes a mesh with odd edges a closed surface: closes cracks with a growing tolerance up to 1e-5
-/// of the diagonal, drops fins and open sheets, caps the holes that are left. Says in the report's
-/// notes what it did. What is left is not oriented yet. Throws Error if nothing is left.
+/// Closes a mesh with odd edges: closes cracks with a growing tolerance up to 1e-5 of the diagonal,
+/// drops fins and open sheets, caps the remaining holes. Adds notes to the report. The result is
+/// not oriented yet. Throws Error if nothing is left.
 void repair(Surface& surface, const std::string& name, MeshReport& report);
 
 /// Describes a mesh that cannot be repaired, for an error message.
 inline constexpr const char* kWrapIt =
     "Close it, or wrap it: --wrap 0.5%, in a manifest wrap = '0.5%', in C++ wrap_mesh()";
 
-/// Edges of one triangle on which a vertex of other such edges lies.
+/// Edges of one triangle that contain a vertex of another such edge.
 std::size_t count_t_junctions(const TriangleMesh& mesh, const EdgeTable& edges);
 
 /// A closed walk along edges that have an odd number of sides.
@@ -36,10 +36,10 @@ struct BorderLoop {
   std::uint32_t edge = kNoIndex;        ///< one of its edges
 };
 
-/// Loops that together run along every odd edge once. They exist: a surface's border has no end.
+/// Loops that together use every odd edge once. They exist, since a surface's border has no end.
 std::vector<BorderLoop> border_loops(const EdgeTable& edges);
 
-/// Triangles that span a loop, in its own plane where it has one.
+/// Triangles that span a loop, in its plane if it is planar.
 std::vector<Triangle> cap(const std::vector<Eigen::Vector3d>& vertices, const BorderLoop& loop);
 
 }  // namespace ist

@@ -14,14 +14,16 @@ namespace ist {
 namespace {
 
 constexpr double kFinest = 1e-3, kCoarsest = 0.1;  ///< of the diagonal
-constexpr double kBeyond = 3.37;   ///< steps of lattice around the bounds; no plane of it on a face
-constexpr double kFarthest = 2;    ///< steps: values beyond are cut
-constexpr double kKeptByWrap = 2;  ///< steps: thickened walls end about one from their middle
-constexpr double kClearly = 0.75;  ///< winding number of what is no hole's other side
-constexpr std::uint32_t kBlockSide = 16;  ///< points along a side of what is decided at once
+constexpr double kBeyond =
+    3.37;  ///< steps of lattice around the bounds; avoids lattice planes on faces
+constexpr double kFarthest = 2;    ///< steps: values are clamped beyond
+constexpr double kKeptByWrap = 2;  ///< steps: thickened walls extend about one from their middle
+constexpr double kClearly = 0.75;  ///< winding number that excludes the other side of a hole
+constexpr std::uint32_t kBlockSide =
+    16;  ///< points along a side of a block that is decided at once
 
-/// Whether nothing a step behind either side of a triangle is clearly inside: it is a sheet, or a
-/// wall that the lattice may miss. Of a large one, whether that is so at two of four points.
+/// True if nothing one step behind either side of a triangle is clearly inside: it is a sheet, or a
+/// wall that the lattice may miss. For a large triangle, true if that holds at two of four points.
 bool is_thin(const TriangleMesh& mesh, const Triangle& t, const OutwardWinding& winding,
              double step) {
   const Eigen::Vector3d corners[3] = {mesh.vertices[t[0]], mesh.vertices[t[1]],
@@ -65,10 +67,10 @@ class Wrap {
 
   std::size_t thin_count() const { return thin_count_; }
 
-  /// Away from holes this is the distance from the surface, negative inside; across a hole it
-  /// passes 0 where the winding number is ½. Near thin walls it is at least what is left of one
-  /// step to them. The solid ends one step beyond the bounds: unoriented triangles may wind about
-  /// points outside.
+  /// Away from holes this is the distance from the surface, negative inside; across a hole it is 0
+  /// where the winding number is ½. Near thin walls it is at least one step minus the distance to
+  /// them. The solid ends one step beyond the bounds: unoriented triangles may have winding numbers
+  /// outside.
   double value(const Eigen::Vector3d& x) const {
     const double side = std::clamp(4 * (0.5 - winding_.at(x)), -1.0, 1.0);
     const double most = kFarthest * step_;
@@ -77,10 +79,10 @@ class Wrap {
     return std::max(value, std::min(most, beyond_bounds(x) - 1.5 * step_));
   }
 
-  /// The value's sign throughout a ball, where it is known: ±1, or 0.
+  /// The value's sign throughout a ball, if it is known: ±1, or 0.
   ///
-  /// The winding number is harmonic off the surface, so that its slope is at most 3/2 of half its
-  /// range over the distance from the surface; the range is taken to be 2.
+  /// The winding number is harmonic off the surface, so its slope is at most 3/2 of half its range
+  /// over the distance from the surface; the range is assumed to be 2.
   int sign_in(const Eigen::Vector3d& centre, double radius) const {
     const double free = distance(*surface_, centre) - radius;
     if (!(free > kFarthest * step_)) return 0;
@@ -91,7 +93,7 @@ class Wrap {
   }
 
  private:
-  /// How far along some axis x lies outside the bounds; negative inside.
+  /// The largest distance along an axis by which x is outside the bounds; negative inside.
   double beyond_bounds(const Eigen::Vector3d& x) const {
     return std::max((bounds_.min() - x).maxCoeff(), (x - bounds_.max()).maxCoeff());
   }
@@ -109,12 +111,11 @@ class Wrap {
   std::size_t thin_count_ = 0;
 };
 
-/// Points of a lattice, by halves of blocks down to those that must be asked one by one.
+/// Samples points of a lattice by halving blocks, down to points that must be evaluated one by one.
 class Sampler {
  public:
   Sampler(const Wrap& wrap, DistanceGrid& grid) : wrap_(wrap), grid_(grid) {}
 
-  /// All points in [first, first + size).
   void fill(const std::array<std::uint32_t, 3>& first, std::uint32_t size) const {
     for (std::size_t k = 0; k < 3; ++k)
       if (first[k] >= grid_.size[k]) return;

@@ -16,8 +16,8 @@ static int small_cube_sinks_into_cube(const ist_asset_t* tree) {
   ist_placed_t b = {
       .size = sizeof b, .asset = tree, .pose = {.q = {1}, .t = {0.25, 0.25, 0.9}}, .scale = 0.5};
   ist_contact_settings_t settings = {.size = sizeof settings, .measure = IST_EXACT};
-  ist_contact_patch_t room[1];
-  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
+  ist_contact_patch_t storage[1];
+  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof storage[0]};
   ist_penetration_t whole = {.size = sizeof whole};
   ist_contact_law_t law = {
       .size = sizeof law, .stiffness = 50, .friction = 0.5, .friction_stiffness = 10};
@@ -25,34 +25,34 @@ static int small_cube_sinks_into_cube(const ist_asset_t* tree) {
   ist_contact_memory_t memory = {0}, before;
   ist_workspace_t workspace = {0};
   const ist_motion_t sideways = {.velocity = {1, 0, 0}};
-  patches.patches = room;
+  patches.patches = storage;
   patches.capacity = 1;
   CHECK(ist_workspace_make(1 << 12, NULL, &workspace) == IST_OK);
   CHECK(ist_contact_patches(&a, &b, &settings, &workspace, &patches, &whole) == IST_OK);
   CHECK(fabs(whole.volume - 0.025) < 1e-12 && patches.count == 1);
-  CHECK(ist_contact_force(&law, room, patches.count, &a, &b, NULL, NULL, 1e-3, &memory, &force) ==
-        IST_OK);
+  CHECK(ist_contact_force(&law, storage, patches.count, &a, &b, NULL, NULL, 1e-3, &memory,
+                          &force) == IST_OK);
   CHECK(fabs(force.force[2] - 1.25) < 1e-9 && fabs(force.normal_force - 1.25) < 1e-9);
   CHECK(fabs(force.energy - 0.0625) < 1e-9 && memory.count == patches.count);
-  CHECK(ist_contact_force(&law, room, patches.count, &a, &b, NULL, &sideways, 1e-3, &memory,
+  CHECK(ist_contact_force(&law, storage, patches.count, &a, &b, NULL, &sideways, 1e-3, &memory,
                           &force) == IST_OK);
   CHECK(fabs(force.force[0] + 0.0025) < 1e-9); /* 10 · 0.001 · 0.25 */
   before = memory;
   law.stiffness = 0;
-  CHECK(ist_contact_force(&law, room, patches.count, &a, &b, NULL, NULL, 1e-3, &memory, &force) ==
-        IST_INVALID_INPUT);
+  CHECK(ist_contact_force(&law, storage, patches.count, &a, &b, NULL, NULL, 1e-3, &memory,
+                          &force) == IST_INVALID_INPUT);
   law.stiffness = 50;
-  CHECK(ist_contact_force(&law, room, patches.count, &a, &b, NULL, NULL, NAN, &memory, &force) ==
+  CHECK(ist_contact_force(&law, storage, patches.count, &a, &b, NULL, NULL, NAN, &memory, &force) ==
         IST_INVALID_INPUT);
   CHECK(force.force[0] == 0 && memcmp(&before, &memory, sizeof memory) == 0);
   CHECK(ist_contact_force(&law, NULL, 1, &a, &b, NULL, NULL, 0, &memory, &force) ==
         IST_NULL_POINTER);
-  CHECK(ist_contact_force(&law, room, patches.count, &a, NULL, NULL, NULL, 0, &memory, &force) ==
+  CHECK(ist_contact_force(&law, storage, patches.count, &a, NULL, NULL, NULL, 0, &memory, &force) ==
         IST_NULL_POINTER);
-  CHECK(ist_contact_force(NULL, room, patches.count, &a, &b, NULL, NULL, 0, &memory, &force) ==
+  CHECK(ist_contact_force(NULL, storage, patches.count, &a, &b, NULL, NULL, 0, &memory, &force) ==
         IST_NULL_POINTER);
   law.size = 1;
-  CHECK(ist_contact_force(&law, room, patches.count, &a, &b, NULL, NULL, 0, &memory, &force) ==
+  CHECK(ist_contact_force(&law, storage, patches.count, &a, &b, NULL, NULL, 0, &memory, &force) ==
         IST_WRONG_SIZE);
   return ist_workspace_release(&workspace) != IST_OK;
 }

@@ -17,77 +17,77 @@ static void counts_wrongly(void* pool, size_t workers, void (*work)(void* batch,
 
 enum { PAIRS = 21 };
 
-enum { ROOM = 5 };
+enum { CAPACITY = 5 };
 
-/* Rooms of ROOM patches each, and what was written to them before is marked. */
-static void clear_rooms(ist_contact_patches_t* rooms, ist_contact_patch_t* room) {
+/* Lists of CAPACITY patches each; their storage holds a pattern that no answer has. */
+static void clear_lists(ist_contact_patches_t* lists, ist_contact_patch_t* storage) {
   size_t i;
-  memset(room, 0xcd, PAIRS * ROOM * sizeof *room);
+  memset(storage, 0xcd, PAIRS * CAPACITY * sizeof *storage);
   for (i = 0; i < PAIRS; ++i) {
-    rooms[i].size = sizeof rooms[i];
-    rooms[i].patch_size = sizeof *room;
-    rooms[i].patches = room + i * ROOM;
-    rooms[i].capacity = ROOM;
-    rooms[i].count = 77;
+    lists[i].size = sizeof lists[i];
+    lists[i].patch_size = sizeof *storage;
+    lists[i].patches = storage + i * CAPACITY;
+    lists[i].capacity = CAPACITY;
+    lists[i].count = 77;
   }
 }
 
 static int patch_batches_answer(scene_t* s, const ist_pair_t* pairs, const ist_pair_t* field_pairs,
                                 ist_workspace_t* workspaces, ist_parallel_t* parallel) {
-  static ist_contact_patch_t room[PAIRS * ROOM], lone[ROOM];
-  static ist_contact_patches_t rooms[PAIRS];
+  static ist_contact_patch_t storage[PAIRS * CAPACITY], lone[CAPACITY];
+  static ist_contact_patches_t lists[PAIRS];
   static ist_penetration_t wholes[PAIRS];
-  ist_contact_patches_t one_room = {.size = sizeof one_room, .patch_size = sizeof lone[0]};
+  ist_contact_patches_t one_list = {.size = sizeof one_list, .patch_size = sizeof lone[0]};
   ist_penetration_t one = {.size = sizeof one};
   const size_t size = sizeof one;
   size_t i;
-  one_room.patches = lone;
-  one_room.capacity = ROOM;
+  one_list.patches = lone;
+  one_list.capacity = CAPACITY;
 
-  clear_rooms(rooms, room);
+  clear_lists(lists, storage);
   memset(wholes, 0xcd, sizeof wholes); /* nothing of it is read */
-  CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, workspaces, 3, rooms, wholes, size,
+  CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, workspaces, 3, lists, wholes, size,
                                   parallel) == IST_OK);
   for (i = 0; i < PAIRS; ++i) {
     memset(lone, 0xcd, sizeof lone);
-    ist_contact_patches(pairs[i].a, pairs[i].b, NULL, &s->workspace, &one_room, &one);
-    CHECK(memcmp(&one, &wholes[i], size) == 0 && one_room.count == rooms[i].count);
-    CHECK(memcmp(lone, room + i * ROOM, sizeof lone) == 0);
+    ist_contact_patches(pairs[i].a, pairs[i].b, NULL, &s->workspace, &one_list, &one);
+    CHECK(memcmp(&one, &wholes[i], size) == 0 && one_list.count == lists[i].count);
+    CHECK(memcmp(lone, storage + i * CAPACITY, sizeof lone) == 0);
     CHECK((one.status == IST_NULL_POINTER) == (i == 7));
   }
-  CHECK(rooms[0].count > 0);
-  clear_rooms(rooms, room);
-  rooms[3].patch_size = 1;
-  CHECK(ist_contact_patches_batch(field_pairs, PAIRS, NULL, workspaces, 3, rooms, wholes, size,
+  CHECK(lists[0].count > 0);
+  clear_lists(lists, storage);
+  lists[3].patch_size = 1;
+  CHECK(ist_contact_patches_batch(field_pairs, PAIRS, NULL, workspaces, 3, lists, wholes, size,
                                   NULL) == IST_OK);
   for (i = 0; i < PAIRS; ++i) {
     memset(lone, 0xcd, sizeof lone);
-    one_room.patch_size = i == 3 ? 1 : sizeof lone[0];
-    ist_contact_patches(field_pairs[i].a, field_pairs[i].b, NULL, &s->workspace, &one_room, &one);
-    CHECK(memcmp(&one, &wholes[i], size) == 0 && one_room.count == rooms[i].count);
-    CHECK(memcmp(lone, room + i * ROOM, sizeof lone) == 0);
+    one_list.patch_size = i == 3 ? 1 : sizeof lone[0];
+    ist_contact_patches(field_pairs[i].a, field_pairs[i].b, NULL, &s->workspace, &one_list, &one);
+    CHECK(memcmp(&one, &wholes[i], size) == 0 && one_list.count == lists[i].count);
+    CHECK(memcmp(lone, storage + i * CAPACITY, sizeof lone) == 0);
     CHECK((one.status == IST_WRONG_SIZE) == (i == 3));
   }
-  CHECK(rooms[0].count > 0);
-  clear_rooms(rooms, room);
-  CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, NULL, 0, rooms, wholes, size, NULL) ==
+  CHECK(lists[0].count > 0);
+  clear_lists(lists, storage);
+  CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, NULL, 0, lists, wholes, size, NULL) ==
         IST_OK);
   CHECK(wholes[0].status == IST_BUDGET_EXHAUSTED && isinf(wholes[0].volume_max));
-  CHECK(rooms[PAIRS - 1].count == 0);
+  CHECK(lists[PAIRS - 1].count == 0);
   CHECK(ist_contact_patches_batch(NULL, 0, NULL, workspaces, 3, NULL, NULL, size, NULL) == IST_OK);
 
-  CHECK(ist_contact_patches_batch(NULL, PAIRS, NULL, workspaces, 3, rooms, wholes, size, NULL) ==
+  CHECK(ist_contact_patches_batch(NULL, PAIRS, NULL, workspaces, 3, lists, wholes, size, NULL) ==
         IST_NULL_POINTER);
-  CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, NULL, 3, rooms, wholes, size, NULL) ==
+  CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, NULL, 3, lists, wholes, size, NULL) ==
         IST_NULL_POINTER);
   CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, workspaces, 3, NULL, wholes, size, NULL) ==
         IST_NULL_POINTER);
-  CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, workspaces, 3, rooms, NULL, size, NULL) ==
+  CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, workspaces, 3, lists, NULL, size, NULL) ==
         IST_NULL_POINTER);
-  CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, workspaces, 3, rooms, wholes, size - 8,
+  CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, workspaces, 3, lists, wholes, size - 8,
                                   NULL) == IST_WRONG_SIZE);
-  rooms[2].size = 8;
-  CHECK(ist_contact_patches_batch(field_pairs, PAIRS, NULL, workspaces, 3, rooms, wholes, size,
+  lists[2].size = 8;
+  CHECK(ist_contact_patches_batch(field_pairs, PAIRS, NULL, workspaces, 3, lists, wholes, size,
                                   NULL) == IST_WRONG_SIZE);
   return 0;
 }

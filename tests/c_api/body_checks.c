@@ -8,8 +8,8 @@ int bodies_are_told(scene_t* s) {
   ist_bounds_t bounds = {.size = sizeof bounds}, placed_bounds = {.size = sizeof placed_bounds};
   ist_penetration_t contact = {.size = sizeof contact};
   ist_wrenches_t wrenches = {.size = sizeof wrenches}, of_patches = {.size = sizeof of_patches};
-  ist_contact_patch_t room[4];
-  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
+  ist_contact_patch_t storage[4];
+  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof storage[0]};
   ist_motion_t towards = {.velocity = {1, 0, 0}};
   ist_placed_t wrong = s->b;
   const ist_asset_t empty = {0};
@@ -44,7 +44,7 @@ int bodies_are_told(scene_t* s) {
   CHECK(ist_asset_get_mass_properties(&s->tree_b, &mass) == IST_WRONG_SIZE);
   CHECK(ist_placed_bounds(&s->b, &bounds) == IST_WRONG_SIZE);
 
-  patches.patches = room;
+  patches.patches = storage;
   patches.capacity = 4;
   CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, &contact) == IST_OK);
   CHECK(ist_wrenches(&contact, &s->b.pose, origin, origin, &wrenches) == IST_OK);
@@ -56,10 +56,10 @@ int bodies_are_told(scene_t* s) {
   CHECK(ist_volume_rate(&contact, &s->a, &s->b, NULL, &towards, &rate) == IST_OK);
   CHECK(rate == -contact.force[0]);
   for (i = 0; i < patches.count; ++i) {
-    CHECK(ist_patch_volume_rate(&room[i], &s->a, &s->b, NULL, &towards, &part) == IST_OK);
+    CHECK(ist_patch_volume_rate(&storage[i], &s->a, &s->b, NULL, &towards, &part) == IST_OK);
     by_patches += part;
-    CHECK(ist_patch_wrenches(&room[i], &s->b.pose, origin, origin, &of_patches) == IST_OK);
-    CHECK(of_patches.on_b.force[0] == room[i].force[0]);
+    CHECK(ist_patch_wrenches(&storage[i], &s->b.pose, origin, origin, &of_patches) == IST_OK);
+    CHECK(of_patches.on_b.force[0] == storage[i].force[0]);
   }
   CHECK(fabs(by_patches - rate) <= 1e-12 * sum);
   CHECK(ist_wrenches(NULL, &s->b.pose, origin, origin, &wrenches) == IST_NULL_POINTER);

@@ -66,7 +66,7 @@ void expect_same(const double (&c)[3], const Eigen::Vector3d& cpp) {
   for (int k = 0; k < 3; ++k) EXPECT_SAME(c[k], cpp[k]);
 }
 
-/// Of two answers.
+/// Compares two answers.
 template <class C, class Cpp>
 requires std::is_class_v<C>
 void expect_same(const C& c, const Cpp& cpp) {
@@ -137,17 +137,17 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
     expect_same(c_separation, both.separation);
 
     ContactPatch patches[16];
-    ist_contact_patch_t c_room[16];
-    ist_contact_patches_t c_patches = {sizeof c_patches, sizeof c_room[0], c_room, 16, 0};
+    ist_contact_patch_t c_storage[16];
+    ist_contact_patches_t c_patches = {sizeof c_patches, sizeof c_storage[0], c_storage, 16, 0};
     const ContactPatches found = contact_patches(a, b, {}, workspace_, patches);
     ASSERT_GE(ist_contact_patches(&c_a, &c_b, nullptr, &c_workspace_, &c_patches, &c_penetration),
               0);
     expect_same(c_penetration, found.penetration);
     ASSERT_EQ(c_patches.count, found.count);
-    for (std::size_t i = 0; i < found.count; ++i) expect_same(c_room[i], patches[i]);
+    for (std::size_t i = 0; i < found.count; ++i) expect_same(c_storage[i], patches[i]);
     without_protrusion({patches, found.count}, a, b, {});
     ASSERT_EQ(ist_patches_without_protrusion(&c_a, &c_b, nullptr, &c_patches), IST_OK);
-    for (std::size_t i = 0; i < found.count; ++i) expect_same(c_room[i], patches[i]);
+    for (std::size_t i = 0; i < found.count; ++i) expect_same(c_storage[i], patches[i]);
 
     const Eigen::Vector3d point(0.1, 0.2, 0.3);
     auto c_wrenches = sized<ist_wrenches_t>();
@@ -196,7 +196,7 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
   EXPECT_GT(answered, 20);
 }
 
-/// A surface alone is told of, and answers no query of spheres.
+/// A mesh-only asset is reported, and answers no query of spheres.
 TEST(CApi, SurfaceAlone) {
   const Asset asset = bake_mesh_only(close_mesh(testing::cube_mesh(), "cube"));
   const ist_asset_t tree = viewed(asset);
@@ -337,7 +337,7 @@ void expect_closed(std::span<const ist_outline_segment_t> segments, std::size_t 
   EXPECT_EQ(from, to);
 }
 
-// The bits of C++, with room for all and for less.
+// The bits of C++, with memory for all and for less.
 TEST(CApi, OutlinesHaveTheBitsOfCpp) {
   const Asset a = bake_mesh_only(close_mesh(make_sample("gear"), "gear"));
   const Asset b = bake_mesh_only(close_mesh(make_sample("torus_knot"), "knot"));
@@ -350,14 +350,14 @@ TEST(CApi, OutlinesHaveTheBitsOfCpp) {
     const PlacedAsset x{a.view(), {{0.6, 0, 0.8, 0}, {0.1, 0, 0}}, 1};
     const PlacedAsset y{b.view(), {{1, 0, 0, 0}, {0.4 * (i % 4), 0.3 * (i % 3), 0.2}}, 0.7};
     const ist_placed_t c_x = placed_in_c(tree_a, x), c_y = placed_in_c(tree_b, y);
-    for (const std::size_t room : {0u, 1u, 2u, 32u}) {
-      std::vector<ContactPatch> patches(room);
-      std::vector<OutlineSegment> segments(room == 2 ? 10 : 20000);
+    for (const std::size_t capacity : {0u, 1u, 2u, 32u}) {
+      std::vector<ContactPatch> patches(capacity);
+      std::vector<OutlineSegment> segments(capacity == 2 ? 10 : 20000);
       const OverlapOutline found = overlap_outline(x, y, {}, workspace, patches, segments);
-      std::vector<ist_contact_patch_t> c_room(room);
+      std::vector<ist_contact_patch_t> c_storage(capacity);
       std::vector<ist_outline_segment_t> c_segments(segments.size());
-      ist_contact_patches_t c_patches = {sizeof c_patches, sizeof c_room[0], c_room.data(), room,
-                                         0};
+      ist_contact_patches_t c_patches = {sizeof c_patches, sizeof c_storage[0], c_storage.data(),
+                                         capacity, 0};
       ist_outline_t c_outline = {
           sizeof c_outline, sizeof c_segments[0], c_segments.data(), c_segments.size(), 0, 0};
       auto whole = sized<ist_penetration_t>();
@@ -365,7 +365,7 @@ TEST(CApi, OutlinesHaveTheBitsOfCpp) {
                 IST_OK);
       expect_same(whole, found.contact.penetration);
       ASSERT_EQ(c_patches.count, found.contact.count);
-      for (std::size_t k = 0; k < c_patches.count; ++k) expect_same(c_room[k], patches[k]);
+      for (std::size_t k = 0; k < c_patches.count; ++k) expect_same(c_storage[k], patches[k]);
       EXPECT_EQ(c_outline.total, found.segments);
       ASSERT_EQ(c_outline.count, std::min(found.segments, segments.size()));
       for (std::size_t k = 0; k < c_outline.count; ++k) {
@@ -374,7 +374,8 @@ TEST(CApi, OutlinesHaveTheBitsOfCpp) {
         EXPECT_EQ(c_segments[k].patch, segments[k].patch);
       }
       if (c_outline.count == c_outline.total)
-        expect_closed(std::span(c_segments).first(c_outline.count), std::max<std::size_t>(room, 1));
+        expect_closed(std::span(c_segments).first(c_outline.count),
+                      std::max<std::size_t>(capacity, 1));
       most = std::max(most, c_patches.count);
     }
     // Stopped: no outline.
@@ -470,7 +471,7 @@ TEST_F(OracleRows, LensesSumToTheVolume) {
   EXPECT_GT(held, 10);
 }
 
-/// A floor on which a cube's spheres stand: flat faces that hardly touch lose most, from C too.
+/// A floor on which a cube's spheres rest: flat faces that hardly touch lose most, from C too.
 TEST(CApi, PatchesWithoutProtrusion) {
   const Asset cube = bake(close_mesh(testing::cube_mesh(), "cube"), {.max_spheres = 500});
   const ist_asset_t tree = viewed(cube);
@@ -481,19 +482,19 @@ TEST(CApi, PatchesWithoutProtrusion) {
   const ContactSettings settings{.spheres_only = true};
   const std::size_t count = contact_patches(a, b, settings, workspace, patches).count;
   double before = 0, after = 0;
-  std::vector<ist_contact_patch_t> c_room(count);
-  std::memcpy(c_room.data(), patches, count * sizeof c_room[0]);
+  std::vector<ist_contact_patch_t> c_storage(count);
+  std::memcpy(c_storage.data(), patches, count * sizeof c_storage[0]);
   for (const ContactPatch& patch : std::span(patches, count)) before += patch.volume;
   without_protrusion({patches, count}, a, b, settings);
   for (const ContactPatch& patch : std::span(patches, count)) after += patch.volume;
   EXPECT_GT(before, 0);
   EXPECT_LT(after, 0.9 * before);
-  ist_contact_patches_t c_patches = {sizeof c_patches, sizeof c_room[0], c_room.data(), count,
+  ist_contact_patches_t c_patches = {sizeof c_patches, sizeof c_storage[0], c_storage.data(), count,
                                      count};
   auto c_settings = sized<ist_contact_settings_t>();
   c_settings.spheres_only = 1;
   ASSERT_EQ(ist_patches_without_protrusion(&c_a, &c_b, &c_settings, &c_patches), IST_OK);
-  for (std::size_t i = 0; i < count; ++i) expect_same(c_room[i], patches[i]);
+  for (std::size_t i = 0; i < count; ++i) expect_same(c_storage[i], patches[i]);
 }
 
 TEST(CApi, BakesAndPushesFromC) { EXPECT_EQ(c_bake_checks(), 0); }

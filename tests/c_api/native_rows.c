@@ -142,8 +142,8 @@ static void separation(int i, int print) {
 
 static void patches(int i, int print) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
-  ist_contact_patch_t room[kMostPatches];
-  ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
+  ist_contact_patch_t storage[kMostPatches];
+  ist_contact_patches_t found = {sizeof found, sizeof storage[0], storage, kMostPatches, 0};
   ist_penetration_t whole = {.size = sizeof whole};
   ist_contact_patches(&a, &b, NULL, &workspace, &found, &whole);
   if (!print) return;
@@ -152,15 +152,15 @@ static void patches(int i, int print) {
 }
 
 static void outline(int i, int print) {
-  static ist_outline_segment_t room[1 << 15];
+  static ist_outline_segment_t storage[1 << 15];
   const ist_placed_t a = placed_a(), b = placed_b(i);
-  ist_contact_patch_t patches_room[kMostPatches];
-  ist_contact_patches_t found = {sizeof found, sizeof patches_room[0], patches_room, kMostPatches,
+  ist_contact_patch_t patch_storage[kMostPatches];
+  ist_contact_patches_t found = {sizeof found, sizeof patch_storage[0], patch_storage, kMostPatches,
                                  0};
   ist_outline_t all = {.size = sizeof all,
-                       .segment_size = sizeof room[0],
-                       .segments = room,
-                       .capacity = sizeof room / sizeof room[0]};
+                       .segment_size = sizeof storage[0],
+                       .segments = storage,
+                       .capacity = sizeof storage / sizeof storage[0]};
   ist_penetration_t whole = {.size = sizeof whole};
   size_t k;
   ist_overlap_outline(&a, &b, NULL, &workspace, &found, &all, &whole);
@@ -168,8 +168,8 @@ static void outline(int i, int print) {
   print_penetration(&whole);
   print_patches(&found);
   for (k = 0; k < all.count; k += 7) {
-    print_doubles(room[k].from, 6);
-    printf(" %u", room[k].patch);
+    print_doubles(storage[k].from, 6);
+    printf(" %u", storage[k].patch);
   }
 }
 
@@ -186,8 +186,8 @@ static void without_protrusion(int i, int print) {
 static void patches_without_protrusion(int i, int print) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
   const ist_contact_settings_t settings = {.size = sizeof settings, .spheres_only = 1};
-  ist_contact_patch_t room[kMostPatches];
-  ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
+  ist_contact_patch_t storage[kMostPatches];
+  ist_contact_patches_t found = {sizeof found, sizeof storage[0], storage, kMostPatches, 0};
   ist_contact_patches(&a, &b, &settings, &workspace, &found, NULL);
   ist_patches_without_protrusion(&a, &b, &settings, &found);
   if (print) print_patches(&found);
@@ -214,7 +214,7 @@ static void wrenches(int i, int print) {
   print_doubles(found.on_b.force, 6);
 }
 
-/* From where A stands to the row's pose, and a part of that way. */
+/* From A's pose to the row's pose, and a part of that motion. */
 static void motions(int i, int print) {
   const ist_pose_t from = IST_POSE_IDENTITY;
   const double about[3] = {0.1, -0.2, 0.3};
@@ -227,7 +227,7 @@ static void motions(int i, int print) {
   print_doubles(there.q, 7);
 }
 
-/* B on its way across A's origin while A turns. */
+/* B moves across A's origin while A turns. */
 static void impact(int i, int print) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
   const double* const t = rows[i].pose.t;
@@ -251,8 +251,8 @@ static void batches(int i, int print) {
   const ist_placed_t ground = {sizeof ground, NULL, &half_space, IST_POSE_IDENTITY, 1};
   const ist_pair_t pairs[2] = {{&a, &b}, {&b, &a}};
   const ist_pair_t field_pair = {&ground, &b};
-  ist_contact_patch_t room[kMostPatches];
-  ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
+  ist_contact_patch_t storage[kMostPatches];
+  ist_contact_patches_t found = {sizeof found, sizeof storage[0], storage, kMostPatches, 0};
   ist_penetration_t answers[3], whole;
   int k;
   ist_penetration_batch(pairs, 2, NULL, &workspace, 1, answers, sizeof whole, NULL);
@@ -314,17 +314,17 @@ static void overlapping(int i, int print) {
 
 /* In the order of the trees. */
 static void lenses(int i, int print) {
-  static ist_lens_t room[8];
+  static ist_lens_t storage[8];
   const ist_placed_t a = placed_a(), b = placed_b(i);
   ist_lenses_t found = {
-      .size = sizeof found, .lens_size = sizeof room[0], .lenses = room, .capacity = 8};
+      .size = sizeof found, .lens_size = sizeof storage[0], .lenses = storage, .capacity = 8};
   size_t k;
   ist_overlap_lenses(&a, &b, NULL, &found);
   if (!print) return;
   printf(" %zu", found.total);
   for (k = 0; k < found.count; ++k) {
-    print_doubles(room[k].centre, 8);
-    printf(" %u %u", room[k].sphere_a, room[k].sphere_b);
+    print_doubles(storage[k].centre, 8);
+    printf(" %u %u", storage[k].sphere_a, storage[k].sphere_b);
   }
 }
 

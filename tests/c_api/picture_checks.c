@@ -142,21 +142,22 @@ int surfaces_are_told(scene_t* s) {
 
 int lenses_are_told(scene_t* s) {
   ist_lens_settings_t settings = {.size = sizeof settings};
-  ist_lens_t room[3];
-  ist_lenses_t lenses = {.size = sizeof lenses, .lens_size = sizeof room[0]};
+  ist_lens_t storage[3];
+  ist_lenses_t lenses = {.size = sizeof lenses, .lens_size = sizeof storage[0]};
   ist_placed_t far_away = s->b, wrong = s->b;
   size_t total, i;
-  memset(room, 0, sizeof room);
+  memset(storage, 0, sizeof storage);
   CHECK(ist_overlap_lenses(&s->a, &s->b, NULL, &lenses) == IST_OK);
   CHECK(lenses.total > 3 && lenses.count == 0);
   total = lenses.total;
-  lenses.lenses = room;
+  lenses.lenses = storage;
   lenses.capacity = 2;
   CHECK(ist_overlap_lenses(&s->a, &s->b, &settings, &lenses) == IST_OK);
-  CHECK(lenses.total == total && lenses.count == 2 && room[2].radius == 0);
+  CHECK(lenses.total == total && lenses.count == 2 && storage[2].radius == 0);
   for (i = 0; i < 2; ++i) {
-    CHECK(room[i].radius > 0 && room[i].thickness > 0);
-    CHECK(fabs(hypot(hypot(room[i].axis[0], room[i].axis[1]), room[i].axis[2]) - 1) <= 1e-12);
+    CHECK(storage[i].radius > 0 && storage[i].thickness > 0);
+    CHECK(fabs(hypot(hypot(storage[i].axis[0], storage[i].axis[1]), storage[i].axis[2]) - 1) <=
+          1e-12);
   }
   settings.measure = IST_INNER;
   CHECK(ist_overlap_lenses(&s->a, &s->b, &settings, &lenses) == IST_OK);
@@ -184,8 +185,8 @@ int lenses_are_told(scene_t* s) {
   settings.size = lenses.size = 0;
   CHECK(ist_overlap_lenses(&s->a, &s->b, NULL, &lenses) == IST_WRONG_SIZE);
   lenses.size = sizeof lenses;
-  lenses.lens_size = sizeof room[0];
-  lenses.lenses = room;
+  lenses.lens_size = sizeof storage[0];
+  lenses.lenses = storage;
   CHECK(ist_overlap_lenses(&s->a, &s->b, &settings, &lenses) == IST_WRONG_SIZE);
   return 0;
 }

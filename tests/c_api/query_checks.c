@@ -237,18 +237,18 @@ int overlaps_answer(scene_t* s) {
 }
 
 int patches_answer(scene_t* s) {
-  ist_contact_patch_t room[8];
-  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
+  ist_contact_patch_t storage[8];
+  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof storage[0]};
   ist_penetration_t whole = {.size = sizeof whole};
   ist_contact_settings_t settings = {.size = sizeof settings};
   ist_placed_t wrong = s->b;
   double volume = 0, left = 0;
   size_t i;
-  patches.patches = room;
+  patches.patches = storage;
   patches.capacity = 8;
   CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, &whole) == IST_OK);
   CHECK(patches.count > 0 && patches.count <= 8);
-  for (i = 0; i < patches.count; ++i) volume += room[i].volume;
+  for (i = 0; i < patches.count; ++i) volume += storage[i].volume;
   CHECK(fabs(volume - whole.volume) <= 1e-12 * whole.volume);
   CHECK(ist_contact_patches(&s->a, &s->b, &settings, &s->workspace, &patches, NULL) == IST_OK);
   CHECK(ist_contact_patches(NULL, &s->b, NULL, &s->workspace, &patches, &whole) ==
@@ -261,9 +261,9 @@ int patches_answer(scene_t* s) {
   /* Without protrusion: by lenses alone, where the faces hardly touch. */
   settings.spheres_only = 1;
   CHECK(ist_contact_patches(&s->a, &s->b, &settings, &s->workspace, &patches, NULL) == IST_OK);
-  for (i = 0, volume = 0; i < patches.count; ++i) volume += room[i].volume;
+  for (i = 0, volume = 0; i < patches.count; ++i) volume += storage[i].volume;
   CHECK(ist_patches_without_protrusion(&s->a, &s->b, &settings, &patches) == IST_OK);
-  for (i = 0; i < patches.count; ++i) left += room[i].volume;
+  for (i = 0; i < patches.count; ++i) left += storage[i].volume;
   CHECK(left <= volume * (1 + 1e-12) && left >= 0);
   CHECK(ist_patches_without_protrusion(NULL, &s->b, &settings, &patches) == IST_NULL_POINTER);
   CHECK(ist_patches_without_protrusion(&s->a, NULL, NULL, &patches) == IST_NULL_POINTER);
@@ -278,7 +278,7 @@ int patches_answer(scene_t* s) {
   patches.count = 0;
   patches.patch_size = 8;
   CHECK(ist_patches_without_protrusion(&s->a, &s->b, NULL, &patches) == IST_WRONG_SIZE);
-  patches.patch_size = sizeof room[0];
+  patches.patch_size = sizeof storage[0];
 
   patches.patches = NULL;
   CHECK(ist_patches_without_protrusion(&s->a, &s->b, NULL, &patches) == IST_NULL_POINTER);
@@ -287,7 +287,7 @@ int patches_answer(scene_t* s) {
   CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, NULL) == IST_INVALID_INPUT);
   patches.patch_size = 0;
   CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, NULL) == IST_WRONG_SIZE);
-  patches.patch_size = sizeof room[0];
+  patches.patch_size = sizeof storage[0];
   settings.size = 1;
   CHECK(ist_contact_patches(&s->a, &s->b, &settings, &s->workspace, &patches, NULL) ==
         IST_WRONG_SIZE);
@@ -300,16 +300,16 @@ int patches_answer(scene_t* s) {
 }
 
 int outlines_answer(scene_t* s) {
-  ist_contact_patch_t room[4];
+  ist_contact_patch_t storage[4];
   ist_outline_segment_t segments[4];
-  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
+  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof storage[0]};
   ist_outline_t outline = {.size = sizeof outline, .segment_size = sizeof segments[0]};
   ist_penetration_t whole = {.size = sizeof whole};
   ist_contact_settings_t settings = {.size = sizeof settings};
   ist_asset_info_t info = {.size = sizeof info};
   ist_placed_t wrong;
   ist_status_t wanted = IST_OK;
-  patches.patches = room;
+  patches.patches = storage;
   patches.capacity = 4;
   outline.segments = segments;
   outline.capacity = 4;
@@ -376,13 +376,13 @@ int fields_answer(scene_t* s) {
   ist_placed_t a = {.size = sizeof a};
   ist_penetration_t answer = {.size = sizeof answer}, again = {.size = sizeof again};
   ist_separation_t gap = {.size = sizeof gap};
-  ist_contact_patch_t room[4];
-  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
+  ist_contact_patch_t storage[4];
+  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof storage[0]};
   double by_plane = 0;
   int kind, i;
   a.shape = &field;
   a.pose = identity;
-  patches.patches = room;
+  patches.patches = storage;
   patches.capacity = 4;
   for (i = 0; i < 125; ++i) distances[i] = -(heights[i] = 0.1f);
   for (kind = IST_HALF_SPACE; kind <= IST_FUNCTION; ++kind) {

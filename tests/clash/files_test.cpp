@@ -184,7 +184,7 @@ TEST_F(ClashFiles, PartsThatAreNoSolidsAreReportedAndTheRestIsAnswered) {
   ASSERT_EQ(report.at("faults").size(), 1u);
   EXPECT_EQ(report["faults"][0]["part"], "open");
   EXPECT_EQ(pairs(report), Words{"twice cube overlapping"});
-  // What both copies fill counts once.
+  // Volume inside both copies counts once.
   EXPECT_NEAR(report["pairs"][0]["volume"].get<double>(), 0.1 * std::pow(edge_, 3), 1e-9);
   EXPECT_NE(report["notes"].dump().find("twice: "), std::string::npos);
   // Nobody may take silence for clean …
@@ -232,7 +232,7 @@ TEST_F(ClashFiles, BaselineTellsWhatIsNew) {
     }
   }
   EXPECT_EQ(report["resolved"], Json::parse(R"([{"a": "c", "b": "d"}])"));
-  // Of a part that cannot be answered nothing is known: its clashes are not resolved.
+  // A part without an answer is unknown: its clashes are not resolved.
   std::string text = read("cube.obj");
   write("open.obj", text.erase(text.find("\nf ") + 1));
   text = part("b", 0.75);
@@ -357,7 +357,7 @@ TEST_F(ClashFiles, FarFromTheOriginRoundingIsTold) {
   EXPECT_EQ(pairs(doubles), Words{"a b overlapping"});
   EXPECT_EQ(doubles.at("notes"), Json::array());
   EXPECT_NE(clash("doubles.gltf").out.find("at (500000.75, 4000001, 1)"), std::string::npos);
-  // A pose of a TOML is of doubles, whatever its mesh is of.
+  // A pose of a TOML is in doubles, whatever its mesh's precision.
   ASSERT_EQ(ist({"sample", "cube", "-o", "cube.stl"}).exit_code, 0);
   write("far.toml",
         "[[part]]\nname = \"a\"\nmesh = \"cube.stl\"\npose = [1,0,0,0, 500000,4000000,0]\n"
@@ -545,7 +545,7 @@ TEST_F(ClashFiles, BadFilesSayWhereAndWhatToDo) {
   EXPECT_EQ(ist({"clash"}).exit_code, 2);
 }
 
-/// The page's files and commands, as they stand there.
+/// The page's files and commands, verbatim.
 TEST_F(ClashFiles, ThePageOfTheDocumentation) {
   std::ifstream page(IST_SOURCE_DIR "/docs/clash.md");
   std::string line, block, kind;

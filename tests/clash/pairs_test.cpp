@@ -33,7 +33,7 @@ TriangleMesh box(const Vector3d& low, const Vector3d& high) {
   return mesh;
 }
 
-/// As a file of float32 has it.
+/// Rounded like a file of float32.
 TriangleMesh rounded(TriangleMesh mesh) {
   for (Vector3d& v : mesh.vertices) v = v.cast<float>().cast<double>();
   return mesh;
@@ -198,7 +198,7 @@ TEST(ClashPairs, ADeepCornerIsNoTouchHoweverLargeTheFaces) {
   EXPECT_EQ(kind(b), ClashKind::overlapping);
 }
 
-// Where facets of both meet along their edges there are parts of the overlap that are rounding.
+// If facets of both meet along their edges, some parts of the overlap are rounding.
 TEST(ClashPairs, ABallInItsRaceIsAsDeepAsItsFacets) {
   constexpr double kRadius = 3, kRace = 15;
   using Counts = std::array<std::uint32_t, 4>;

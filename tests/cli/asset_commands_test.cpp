@@ -85,7 +85,7 @@ TEST_F(AssetCommands, CheckRefusesTheWrongMesh) {
   expect_exit(2, {"check", "cube.ist"}, "mesh");
 }
 
-/// Every format holds the same spheres; they lie in the cube and keep off each other.
+/// Every format contains the same spheres; they lie in the cube and are disjoint.
 TEST_F(AssetCommands, ExportsTheSameSpheresInEveryFormat) {
   for (const char* name : {"s.csv", "s.ply", "s.json"})
     ASSERT_EQ(ist({"export", "cube.ist", "-o", name}).exit_code, 0) << name;

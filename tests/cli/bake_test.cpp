@@ -116,7 +116,7 @@ TEST_F(BakeCommand, SpheresTooCoarseForThinPartsAreToldOf) {
   EXPECT_GT(enough, 8'000);
   EXPECT_LT(enough, 40'000);
   EXPECT_NE(ist({"info", "plate.ist"}).out.find("spheres are enough"), std::string::npos);
-  // Thinner walls than any number of spheres fills are told of too.
+  // Walls too thin for any number of spheres are reported too.
   const Outcome hopeless =
       ist({"bake", "plate.obj", "-o", "plate.ist", "--spheres", "200", "--scale", "1,1,0.001"});
   EXPECT_NE(hopeless.err.find("too coarse for thin parts"), std::string::npos) << hopeless.err;

@@ -3,7 +3,7 @@
 #include "cli/program.h"
 #include "support/shared_data.h"
 
-// What a mesh file declares about its axes and unit: said by the bake, and turned by nobody.
+// A mesh file's declared axes and unit are reported by the bake, and not applied.
 
 namespace {
 
@@ -19,7 +19,7 @@ class DeclaredFrame : public CommandLine {
   }
 };
 
-/// A tetrahedron that tells its axes apart: 1 × 2 × 3.
+/// A tetrahedron with distinguishable axes: 1 × 2 × 3.
 std::string collada(const std::string& asset) {
   return "<COLLADA version=\"1.4.1\"><asset>" + asset +
          "</asset><library_geometries><geometry id='g'><mesh><source id='p'>"

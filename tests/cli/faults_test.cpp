@@ -10,7 +10,7 @@
 
 #include "cli/program.h"
 
-// What befalls a bake from outside: killed, interrupted, a full disk, files it may not touch,
+// External faults of a bake: killed, interrupted, a full disk, files it may not touch,
 // another bake to the same place. Always the old asset is intact or the new one whole, and nothing
 // else is there.
 
@@ -46,7 +46,7 @@ class Faults : public CommandLine {
 
   std::vector<std::string> only_output() const { return {"out.ist"}; }
 
-  /// The bake to out.ist fails with exit code 1; what was there stays and nothing comes to it.
+  /// The bake to out.ist fails with exit code 1; existing files stay and no file is added.
   void expect_failure(const RunOptions& options, const std::string& message) {
     const Outcome outcome = ist(bake_to("out.ist"), options);
     if (outcome.exit_code == 127) GTEST_SKIP() << "nobody may not run the program where it lies";
@@ -124,7 +124,7 @@ TEST_F(Faults, InterruptedAtManyMoments) {
 }
 
 TEST_F(Faults, AFullDisk) {
-  // The largest file that the program may write stands in for it: the write fails half way.
+  // The largest file that the program may write replaces a full disk: the write fails halfway.
   RunOptions options;
   options.in_child = [] {
     std::signal(SIGXFSZ, SIG_IGN);
@@ -175,7 +175,7 @@ TEST_F(Faults, AnUnreadableAsset) {
 }
 
 TEST_F(Faults, BakesToOneOutputAtOnce) {
-  // Of different lengths, so that a mixture would be neither.
+  // The lengths differ, so a mixture would be neither.
   ASSERT_EQ(ist(bake_to("other.ist", "200")).exit_code, 0);
   const std::string other = read("other.ist");
   std::filesystem::remove(folder_ / "other.ist");

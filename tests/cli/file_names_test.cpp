@@ -90,14 +90,14 @@ TEST_F(FileNames, EndingsMayBeInCapitals) {
   }
 }
 
-/// A library speaks to callers who never saw the program: ways out are its own, or are told for
-/// every language.
+/// Callers of the library may not have the program: its messages advise in terms of the library,
+/// for every language.
 TEST(Messages, NoneOfTheLibraryNamesAnOptionOfTheProgram) {
   const std::regex option("\"[^\"]*--[a-z]"), every(" in Python | in a manifest ");
-  for (const char* room : {"src", "ist/query", "ist/scene", "ist/c_api", "ist/bullet", "ist/bake",
-                           "ist/robots/covers", "cuda", "include"})
+  for (const char* folder : {"src", "ist/query", "ist/scene", "ist/c_api", "ist/bullet", "ist/bake",
+                             "ist/robots/covers", "cuda", "include"})
     for (const auto& entry :
-         std::filesystem::recursive_directory_iterator(IST_SOURCE_DIR "/" + std::string(room))) {
+         std::filesystem::recursive_directory_iterator(IST_SOURCE_DIR "/" + std::string(folder))) {
       if (!entry.is_regular_file()) continue;
       std::ifstream file(entry.path());
       for (std::string line; std::getline(file, line);)

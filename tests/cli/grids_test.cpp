@@ -61,7 +61,7 @@ TEST_F(GridCommands, OptionsThatTheGridHasNoUseForAreRefused) {
   for (const char* grid : {"uniform", "explicit", "implicit", "hybrid"})
     expect_refused(grid, "--epsilon", "0.1");
   EXPECT_EQ(bake("uniform", {"--grid-start", "4", "--grid-resolution", "16"}).exit_code, 2);
-  // What is automatic may be said, and what is used has an effect.
+  // Automatic values may be given explicitly, and settings in use have an effect.
   EXPECT_EQ(bake("banded", {"--grid-resolution", "0", "--grid-refinements", "-1"}).exit_code, 0);
   for (const char* grid : {"implicit", "hybrid"})
     EXPECT_EQ(bake(grid, {"--grid-start", "4", "--grid-resolution", "16", "--grid-refinements", "1",

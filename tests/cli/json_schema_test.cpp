@@ -4,7 +4,7 @@
 
 #include "cli/program.h"
 
-// Every JSON that the program prints holds the fields of docs/json.md, those and no others.
+// Every JSON that the program prints contains exactly the fields of docs/json.md.
 
 namespace {
 
@@ -43,7 +43,7 @@ Paths documented(const std::string& heading) {
 
 class JsonSchema : public CommandLine {
  protected:
-  /// Adds what the command prints, after a look that every key is ASCII.
+  /// Adds the command's output, and checks that every key is ASCII.
   void add(const std::vector<std::string>& arguments, Paths& paths) {
     const Outcome outcome = ist(arguments);
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;

@@ -24,7 +24,7 @@ struct Option {
   Arguments refused;
 };
 
-/// Of every option that takes a number.
+/// A case for every option that takes a number.
 const std::vector<Option> kWhole = {
     {kBake, "--spheres", "from 0 to 2147483647", {"2147483648"}},
     {kBake, "--grid-resolution", "from 0 to 1024", {"1025"}},
@@ -109,7 +109,7 @@ TEST_F(Numbers, LeadingZerosAreNotOctal) {
   EXPECT_EQ(asked(with(hybrid, "--grid-start", "08")).at("grid_start"), 8);
   EXPECT_EQ(asked(with(hybrid, "--grid-refinements", "01")).at("grid_refinements"), 1);
   EXPECT_EQ(asked(with(hybrid, "--grid-rounds", "010")).at("grid_rounds"), 10);
-  // Elsewhere an 8 tells: it is no octal digit.
+  // Elsewhere an 8 shows it: it is not an octal digit.
   for (const Option& option : kWhole) {
     if (option.name.starts_with("--grid") || option.name == "--detail") continue;
     const Outcome outcome = ist(with(option.command, option.name, "08"));

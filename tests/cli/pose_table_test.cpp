@@ -63,7 +63,7 @@ TEST_F(PoseTable, QuotedFieldsHoldAnything) {
   EXPECT_GT(json[1].at("volume"), 0.4);
   EXPECT_EQ(answers(table, {"--class", "x,y"}).size(), 1u);
   EXPECT_EQ(answers(table, {"--class", "z"}).size(), 1u);
-  // What is read from a field is written as one.
+  // A quoted field is written as one again.
   const Outcome csv = ask(table);
   EXPECT_NE(csv.out.find("\n\"a, b\",0,"), std::string::npos) << csv.out;
   EXPECT_NE(csv.out.find("\n\"say \"\"so\"\"\n\nand so\","), std::string::npos) << csv.out;

@@ -1,4 +1,4 @@
-// What documents print is what the program prints, except for times.
+// Output in documents equals the program's, except for times.
 #include <fstream>
 #include <regex>
 #include <sstream>

@@ -34,7 +34,7 @@ std::vector<char*> pointers(std::vector<std::string>& strings) {
   return result;
 }
 
-/// Moves what there is to read into `text`; false at the end of the stream.
+/// Appends the available input to `text`; false at the end of the stream.
 bool drain(int descriptor, std::string& text) {
   std::array<char, 4096> buffer;
   const ssize_t got = read(descriptor, buffer.data(), buffer.size());

@@ -213,7 +213,7 @@ TEST_F(QueryCommand, OnePoseIsAnsweredForAPerson) {
   EXPECT_EQ(outcome.exit_code, 0);
   for (const char* word : {"volume", "sum range", "force/k", "torque/k", "distance", "µs"})
     EXPECT_NE(outcome.out.find(word), std::string::npos) << word;
-  // By spheres nothing is told that could be taken for accuracy.
+  // Spheres report nothing that could be mistaken for accuracy.
   EXPECT_EQ(outcome.out.find("bounds"), std::string::npos) << outcome.out;
 }
 
@@ -413,7 +413,7 @@ TEST_F(QueryCommand, AnswersThatCannotBeWrittenAreAnError) {
   EXPECT_NE(read("err").find("standard output"), std::string::npos) << read("err");
 }
 
-/// The program speaks the C locale whatever the user's is.
+/// The program uses the C locale whatever the user's locale.
 TEST_F(QueryCommand, NumbersDoNotDependOnTheLocale) {
   const std::string command =
       "localedef -i de_DE -f UTF-8 " + (folder_ / "de_DE.UTF-8").string() + " >/dev/null 2>&1";

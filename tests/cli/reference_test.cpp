@@ -6,7 +6,7 @@
 
 #include "cli/program.h"
 
-// What the program says of itself, and the scene that it exports.
+// The program's own reference, and the scene that it exports.
 
 namespace {
 

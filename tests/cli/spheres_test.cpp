@@ -143,7 +143,7 @@ TEST_F(RobotCommands, PlannersGetAWholeRobot) {
   EXPECT_EQ(curobo["cspace"]["joint_names"].as<Words>(), joints);
   EXPECT_EQ(curobo["cspace"]["default_joint_position"].as<std::vector<double>>(),
             (std::vector<double>{1.5, 0, 0.04}));
-  // What cuRobo's converter of XRDF asks for.
+  // The requirements of cuRobo's converter of XRDF.
   EXPECT_TRUE(xrdf["collision"]["buffer_distance"].IsMap());
   EXPECT_EQ(xrdf["self_collision"]["geometry"].as<std::string>(),
             xrdf["collision"]["geometry"].as<std::string>());
@@ -200,7 +200,8 @@ TEST_F(RobotCommands, TheDefaultPoseIsAskedFor) {
   expect_error({"spheres", "cube.obj", "-o", "o.json", "--pose", "j2=1"}, 2, "is not a robot");
 }
 
-/// An arm that reaches into its base at most angles: that is told, until an SRDF excludes the pair.
+/// An arm that reaches into its base at most angles: this is reported until an SRDF excludes the
+/// pair.
 TEST_F(RobotCommands, PairsThatMostlyCollideAreToldOrExcluded) {
   write(
       "dip.urdf",
@@ -428,7 +429,7 @@ TEST_F(RobotCommands, SpheresAreFineWhereLinksPassClose) {
     EXPECT_TRUE(link["covered"].get<bool>());
   }
   EXPECT_LE(count, 96u);
-  // As many false meetings as there are poses take no more memory.
+  // Even a false meeting in every pose takes no more memory.
   const Outcome coarse = ist({"spheres", "near.urdf", "-o", "n.json", "--count", "1"});
   EXPECT_EQ(coarse.exit_code, 0) << coarse.err;
   EXPECT_LT(coarse.peak_memory, 1'000'000'000u);
@@ -502,7 +503,7 @@ TEST_F(RobotCommands, WarningsOfAKindAreOneLine) {
   EXPECT_EQ(outcome.err.find("link second"), std::string::npos) << outcome.err;
 }
 
-/// Links and spheres stand where the joints put them, and are read back as meshes.
+/// Links and spheres are placed by the joints, and are read back as meshes.
 TEST_F(RobotCommands, AScene) {
   write("arm.urdf", kArm);
   ASSERT_EQ(ist({"spheres", "arm.urdf", "-o", "a.glb", "--count", "3"}).exit_code, 0);
@@ -544,7 +545,7 @@ TEST_F(RobotCommands, InnerAndMatchedSpheres) {
   EXPECT_NEAR(volume, 2, 0.01);
 }
 
-/// As other programs read them: every corner of the link lies in one of its three shapes.
+/// Read like other programs: every corner of the link lies in one of its three shapes.
 TEST_F(RobotCommands, CapsulesHoldTheLink) {
   ASSERT_EQ(ist({"sample", "bolt", "-o", "bolt.obj"}).exit_code, 0);
   write(

@@ -49,7 +49,7 @@ TEST_F(Usage, WrongUsageExitsWith2AndSaysWhy) {
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--grid", "octree"}, "grid");
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--device", "tpu"}, "device");
   expect_usage_error({"sample", "cube"}, "output");
-  // What was probably meant.
+  // Suggests the probable intention.
   expect_usage_error({"bke", "cube.obj"}, "Did you mean 'bake'?");
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--sphere=5"},
                      "Did you mean '--spheres'?");

@@ -21,7 +21,7 @@ namespace {
 constexpr int kDamages = 12000;  // of each file
 
 void feed(const std::string& bytes) {
-  // On the heap and no larger: the address sanitizer sees what is read beyond its end.
+  // On the heap and no larger, so that the address sanitizer detects reads beyond its end.
   const std::vector<std::uint8_t> input(bytes.begin(), bytes.end());
   LLVMFuzzerTestOneInput(input.data(), input.size());
 }

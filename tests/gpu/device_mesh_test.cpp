@@ -22,7 +22,7 @@
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 
-// What the card answers about a mesh, against the CPU's own hierarchy: the same bits.
+// The device's answers about a mesh equal those of the CPU's hierarchy, bit for bit.
 
 namespace ist {
 namespace {
@@ -260,8 +260,8 @@ TEST_F(DeviceMeshTest, Dragon) {
 TEST_F(DeviceMeshTest, AnEndOfMemoryLeaksNothing) {
   const MeshSolid solid(closed(icosphere_mesh(4), "sphere"));
   int failures = 0;
-  for (std::size_t room = 0;; room += 50000) {
-    ScarceMemory memory(room);
+  for (std::size_t available = 0;; available += 50000) {
+    ScarceMemory memory(available);
     GpuSettings settings;
     settings.memory = &memory;
     Queue queue(settings);
@@ -273,7 +273,7 @@ TEST_F(DeviceMeshTest, AnEndOfMemoryLeaksNothing) {
       ++failures;
     }
     queue.wait();
-    EXPECT_EQ(memory.left(), room);
+    EXPECT_EQ(memory.left(), available);
     if (built) break;
   }
   EXPECT_GT(failures, 3);

@@ -86,7 +86,7 @@ TEST_F(GpuExactTest, AGraphMayCaptureThem) {
   cudaGraphDestroy(graph);
 }
 
-/// Steps, in a graph too: bits of a search, but for the counts of nodes.
+/// Steps, in a graph too: the bits of a search, except the counts of nodes.
 TEST_F(GpuExactTest, WhatIsKeptDoesNotShow) {
   std::vector<BatchPair> pairs = exact_pairs(48, 20'000);
   for (const BatchPair& pair : aligned_pairs(49, 10'000)) pairs.push_back(pair);
@@ -134,7 +134,7 @@ TEST_F(GpuExactTest, AnswersAreTheCpus) {
     expect_near(compare_exactly(exact_assets(), pairs, ask_device(exact_solids(), pairs)));
 }
 
-/// Where parts touch, the area and the normal of the faces that lie on each other too.
+/// For touching parts, also the area and normal of the faces that lie on each other.
 TEST_F(GpuExactTest, MatesTouchAsOnTheCpu) {
   const MatedBatch mated(52, 2000);
   const Differences worst =

@@ -47,7 +47,7 @@ TEST_F(GpuPatchesTest, HaveTheBitsOfAWarpOnTheHost) {
                        HostPatches(batch_solids()).run(pairs, measure, most, 1));
 }
 
-/// Of thousands of spheres, and of copies at one pose.
+/// Assets with thousands of spheres, and copies at one pose.
 TEST_F(GpuPatchesTest, LargeContactsHaveTheBitsOfAWarpOnTheHost) {
   std::vector<BatchPair> pairs = detailed_pairs(30, 52);
   for (const BatchPair& copy : copies_in_place(12, 53)) pairs.push_back(copy);
@@ -68,7 +68,7 @@ TEST_F(GpuPatchesTest, ManyPairsHaveTheSameBitsInEveryRun) {
   expect_same_bits(on_device(solids, pairs, Measure::matched, 4), repeated);
 }
 
-/// Patches and penetrations may follow each other in one workspace, and a graph may hold them.
+/// Patches and penetrations may follow each other in one workspace, and a graph may contain them.
 TEST_F(GpuPatchesTest, AGraphMayCaptureThemBesidePenetrations) {
   const std::vector<BatchPair> pairs = RandomPairs(55).pairs(500);
   const GpuSolids solids(batch_solids());
@@ -96,7 +96,7 @@ TEST_F(GpuPatchesTest, AGraphMayCaptureThemBesidePenetrations) {
   cudaGraphDestroy(graph);
 }
 
-/// By Measure::exact: general poses, aligned ones, mates, and what cannot be asked.
+/// Measure::exact in general poses, aligned ones, mates, and for invalid queries.
 TEST_F(GpuPatchesTest, ExactOnesHaveTheBitsOfAWarpOnTheHost) {
   std::vector<BatchPair> pairs = exact_pairs(57, 60);
   for (const BatchPair& pair : aligned_pairs(58, 60)) pairs.push_back(pair);

@@ -109,7 +109,7 @@ TEST_F(GpuQueryTest, ManyPairsInFieldsHaveTheSameBitsInEveryRun) {
   ask_for_few_and_many(scene.solids, scene.pairs, 300000);
 }
 
-/// More than a round has room for, and some more than any has.
+/// More pairs than fit into a round, and some that fit into none.
 TEST_F(GpuQueryTest, LargePairsAmongTrianglesHaveTheSameBitsHoweverManyThereAre) {
   const MixedScene scene(500);
   std::vector<BatchPair> some;
@@ -164,7 +164,7 @@ TEST_F(GpuQueryTest, ManyPairsHaveTheSameBitsInEveryRun) {
   expect_same_bits(many.get(), repeated);
 }
 
-/// Of one of a few pairs each: only what is compared is kept.
+/// Answers of one of a few pairs each: only compared members are kept.
 class RepeatedPairs {
  public:
   RepeatedPairs(const std::vector<BatchPair>& some, std::size_t size)

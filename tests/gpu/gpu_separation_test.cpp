@@ -88,7 +88,8 @@ TEST_F(GpuSeparationTest, ManyPairsHaveTheSameBitsInEveryRun) {
   expect_same_bits(on_device(solids, pairs), repeated);
 }
 
-/// Penetrations and separations may follow each other in one workspace, and a graph may hold them.
+/// Penetrations and separations may follow each other in one workspace, and a graph may contain
+/// them.
 TEST_F(GpuSeparationTest, AGraphMayCaptureItBesidePenetrations) {
   const std::vector<BatchPair> pairs = RandomPairs(33).pairs_at_all_distances(500);
   const GpuSolids solids(batch_solids());

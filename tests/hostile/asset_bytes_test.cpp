@@ -21,7 +21,7 @@ namespace {
 using testing::AlignedBytes;
 using testing::small_asset;
 
-/// What a reader must say of an asset whose byte `at` was changed, its hash as it was.
+/// The status of an asset whose byte `at` was changed, with the old hash.
 AssetStatus status_after_damage(std::size_t at, std::uint64_t file_bytes_before,
                                 const AlignedBytes& bytes) {
   if (at < offsetof(AssetHeader, format_major)) return AssetStatus::not_an_asset;
@@ -85,7 +85,7 @@ TEST(AssetBytes, SaysWhatIsWrong) {
   EXPECT_THROW(Asset(std::span(bytes).first(100), "cut.ist"), Error);
 }
 
-/// What a query does with accepted bytes must be finite in time and stay inside them; the values
+/// A query of accepted bytes must end and stay inside them; the values
 /// may be any.
 void use(const AlignedBytes& bytes, const AssetView& sound) {
   static Workspace workspace(1u << 16);
@@ -208,7 +208,7 @@ TEST(AssetBytes, CheckEndsOnHostileAssets) {
   }
 }
 
-// Each field the query stands on is looked at by name too: chance may miss one.
+// Each field that the query relies on is damaged by name too: random changes may miss one.
 TEST(AssetBytes, EveryOffsetAndCountIsLookedAt) {
   const auto bytes = small_asset(40, 1);
   const auto tree_fields = [](std::size_t tree) {

@@ -32,8 +32,8 @@ std::vector<std::string> file_names() {
   return names;
 }
 
-/// What the program may take beside what it takes to say its version, and a share for every byte of
-/// the file: refusing, and packing 100 spheres. The widest reader of one byte is that of glTF: its
+/// [bytes] Memory that the program may use beyond that of `--version` and a share per byte of the
+/// file: to refuse it, and to pack 100 spheres. The reader of glTF uses most per byte, since its
 /// JSON becomes a document.
 constexpr std::size_t kRefusing = std::size_t{12} << 20, kPacking = std::size_t{36} << 20;
 constexpr std::size_t kBytesPerByte = 30;

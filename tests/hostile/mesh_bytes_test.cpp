@@ -17,7 +17,7 @@ using testing::AlignedBytes;
 
 Asset alone(TriangleMesh mesh) { return bake_mesh_only(close_mesh(std::move(mesh), "mesh")); }
 
-/// Reads all that a query may: the address sanitizer sees what lies outside.
+/// Reads everything that a query may read: the address sanitizer detects reads outside.
 void walk_mesh(const AlignedBytes& bytes) {
   AssetView view;
   ASSERT_EQ(AssetView::from_bytes(bytes.span(), view), AssetStatus::ok);

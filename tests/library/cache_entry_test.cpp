@@ -82,7 +82,7 @@ TEST_F(CacheKeys, FollowTheBuffersOfAGltf) {
   EXPECT_EQ(key(gltf), first);
 }
 
-/// What assimp opens for a file of a format of its own we do not know: it counts by its content.
+/// Files that assimp opens for its own formats are unknown, so the content is hashed.
 TEST_F(CacheKeys, FollowTheMeshOfForeignFormats) {
   EXPECT_ANY_THROW(key(write("a.fbx", "no FBX")));
   EXPECT_ANY_THROW(key((folder_ / "nowhere.obj").string()));
@@ -93,7 +93,7 @@ TEST_F(CacheKeys, FollowTheMeshOfForeignFormats) {
   EXPECT_FALSE(raw("1", "") == raw("2", ""));
 }
 
-/// Where hashes of assets change, old entries of a cache must not be found.
+/// If hashes of assets change, old entries of a cache must not be found.
 TEST(BakeRevision, IsRaisedWithTheHashesOfAssets) {
   std::ifstream file(IST_SOURCE_DIR "/tests/soak/bake_hashes.csv", std::ios::binary);
   std::ostringstream text;

@@ -9,7 +9,7 @@
 
 #include "library/library_folder.h"
 
-// What befalls a bake with a cache from outside: killed, a full disk, damage, others on the same
+// External faults of a bake with a cache: killed, a full disk, damage, others on the same
 // folder. Nothing is lost, nothing wrong, and nothing is baked twice but what was in flight.
 
 namespace ist::testing {
@@ -110,7 +110,7 @@ TEST_F(Cache, ALimitKeepsWhatWasUsedLast) {
   EXPECT_EQ(counts().at("baked"), 5);
   const std::uint64_t bytes = cache_of().at("bytes");
   write("cache/README", "mine");
-  // cube.obj is asked for again, much later than the rest.
+  // cube.obj is requested again, much later than the rest.
   using namespace std::chrono_literals;
   for (const auto& file : std::filesystem::recursive_directory_iterator(folder_ / "cache"))
     if (file.is_regular_file())
@@ -221,7 +221,7 @@ TEST_F(Cache, KilledAtRandomMoments) {
     ASSERT_TRUE(ended || outcome.exit_code == 128 + SIGKILL) << outcome.err;
     ASSERT_EQ(outcome.err.find("damaged"), std::string::npos) << outcome.err;
     const std::size_t after = entries_in("cache");
-    // What was in the cache stays there, and is not baked again.
+    // Entries in the cache stay there, and are not baked again.
     ASSERT_GE(after, before);
     ASSERT_LE(baked_in(outcome.err), after - before) << outcome.err;
     for (const auto& [name, bytes] : files_in("out")) {

@@ -23,12 +23,12 @@ class LibraryFolder : public CommandLine {
                             int exit_code = 0) const;
 
   /// Names and bytes of the files in a folder; none if there is no such folder.
-  /// Those that begin with a dot are not among them.
+  /// Without names that begin with a dot.
   std::map<std::string, std::string> files_in(const std::string& folder) const;
   /// Entries of a cache.
   std::size_t entries_in(const std::string& cache) const;
 
-  /// Of library.toml.
+  /// The content of library.toml.
   static const std::vector<std::string>& names();
 };
 

@@ -117,7 +117,7 @@ TEST_F(Library, OneThatFailsFailsAlone) {
   EXPECT_NE(bake("out").err.find("in a manifest repair = true"), std::string::npos);
 }
 
-/// What is there and follows from the same mesh and settings is not baked again, without a cache.
+/// Existing assets of the same mesh and settings are not baked again, even without a cache.
 TEST_F(Library, WhatIsThereAndUnchangedIsNotBakedAgain) {
   const auto counts = [&] { return summary_of("out").at("counts"); };
   EXPECT_EQ(counts().at("baked"), 5);
@@ -260,7 +260,7 @@ TEST_F(Library, OnATerminalProgressIsOneLine) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find(" of 5 assets  0 cached  0 failed"), std::string::npos) << outcome.err;
   EXPECT_NE(outcome.err.find(" a second  "), std::string::npos) << outcome.err;
-  // What is worth a word stands above it.
+  // Remarkable assets are listed above it.
   for (const std::string& line : lines_of(outcome.err))
     EXPECT_TRUE(line.ends_with("\r\033[K") || line.find("warning") != std::string::npos) << line;
   EXPECT_TRUE(outcome.err.ends_with("\r\033[K")) << outcome.err;

@@ -1,6 +1,6 @@
 #include "library/library_folder.h"
 
-// A manifest with every mistake that a person makes: each is told with its line and the way out,
+// A manifest with every mistake that a person makes: each is reported with its line and the remedy,
 // all at once, and nothing is written.
 
 namespace ist::testing {

@@ -87,11 +87,12 @@ class ExactMated : public ::testing::Test {
   /// The row's volume, by the query of A and B.
   Penetration compare(const MatedRow& row, const PlacedAsset& a, const PlacedAsset& b) {
     const Penetration found = testing::exactly(a, b, workspace_);
-    const double smaller = std::min(a.asset.volume(), b.asset.volume()), room = kTruth * smaller;
+    const double smaller = std::min(a.asset.volume(), b.asset.volume()),
+                 tolerance = kTruth * smaller;
     EXPECT_EQ(found.status, QueryStatus::ok);
-    EXPECT_NEAR(found.volume, row.volume, room);
-    EXPECT_LE(found.volume_min, row.volume + room);
-    EXPECT_GE(found.volume_max, row.volume - room);
+    EXPECT_NEAR(found.volume, row.volume, tolerance);
+    EXPECT_LE(found.volume_min, row.volume + tolerance);
+    EXPECT_GE(found.volume_max, row.volume - tolerance);
     EXPECT_LE(found.volume_min, found.volume);
     EXPECT_LE(found.volume, found.volume_max);
     EXPECT_LE(found.volume_max, smaller * (1 + 1e-12));
@@ -107,7 +108,7 @@ class ExactMated : public ::testing::Test {
   Workspace workspace_;
 };
 
-/// Those whose faces in contact are all square to the direction of the mate.
+/// Mates whose touching faces are all perpendicular to the direction of the mate.
 const std::set<std::string> kPlanar = {"bolt_in_plate",  "bracket_on_plate", "brick_beside",
                                        "brick_on_brick", "brick_shifted",    "brick_turned",
                                        "fillet_stack",   "plate_cross",      "plate_on_plate"};
@@ -134,7 +135,7 @@ TEST_F(ExactMated, EveryRow) {
       if (!found.touching || mirror) continue;
       const double faces = area_of_faces(part_mesh(row.mesh_a), part_mesh(row.mesh_b), row.pose);
       EXPECT_NEAR(found.contact_area, faces, 1e-9 * faces);
-      // What a millionth of the unit cuts off, by the faces it is cut from.
+      // The volume that a millionth of the unit cuts off, from the area of the faces.
       const auto moved = std::find_if(rows.begin(), rows.end(), [&](const MatedRow& other) {
         return other.name == row.name && other.moved == 1e-6;
       });
@@ -144,8 +145,8 @@ TEST_F(ExactMated, EveryRow) {
       EXPECT_NEAR(found.contact_area, area, area * 1e-4);
       const Penetration deeper = testing::exactly(a, {b.asset, moved->pose, 1}, workspace_);
       EXPECT_LE((found.centroid - deeper.centroid).norm(), 1e-3 * testing::size_of(a));
-      const Point way = Point(moved->pose.t) - Point(row.pose.t);
-      EXPECT_LE((found.contact_normal + way.normalized()).norm(), 1e-6);
+      const Point direction = Point(moved->pose.t) - Point(row.pose.t);
+      EXPECT_LE((found.contact_normal + direction.normalized()).norm(), 1e-6);
     }
   }
   EXPECT_EQ(planar, static_cast<int>(kPlanar.size()));
@@ -187,18 +188,18 @@ TEST_F(ExactMated, EveryRightAngledTurnOfBoth) {
 }
 
 /// [u²] What of the solid's surface is seen from far away in a direction, all layers of it.
-double shadow(const TriangleMesh& mesh, const Point& way) {
+double shadow(const TriangleMesh& mesh, const Point& direction) {
   double sum = 0;
   for (const auto& t : mesh.triangles) {
     const Point& a = mesh.vertices[t[0]];
     const Point normal = (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a) / 2;
-    sum += std::max(0.0, normal.dot(way));
+    sum += std::max(0.0, normal.dot(direction));
   }
   return sum;
 }
 
 /// A solid and its copy d away have the volume V − d · shadow + O(d²) in common, never less, and
-/// the same if the copy goes the other way.
+/// the same if the copy moves in the opposite direction.
 class ExactCopies : public ::testing::TestWithParam<const char*> {
  protected:
   static bool is_sample() { return path().string() == "gear"; }
@@ -247,28 +248,28 @@ TEST_P(ExactCopies, InPlaceAndAside) {
   EXPECT_FALSE(in_place.touching);
   std::mt19937_64 random(5);
   for (const double aside : {1e-9, 1e-6, 1e-3})
-    for (const Point& way : {Point(Point::UnitX()), Point(Point::UnitZ()),
-                             Point(testing::random_turn(random) * Point::UnitX())}) {
+    for (const Point& direction : {Point(Point::UnitX()), Point(Point::UnitZ()),
+                                   Point(testing::random_turn(random) * Point::UnitX())}) {
       SCOPED_TRACE(aside);
       const double d = aside * size;
       const auto moved = [&](double by) {
-        const Point t = by * way;
+        const Point t = by * direction;
         return testing::exactly(still, {asset.view(), {{1, 0, 0, 0}, {t.x(), t.y(), t.z()}}, 1},
                                 workspace);
       };
       const Penetration there = moved(d), back = moved(-d);
-      const double least = whole - d * shadow(mesh, way), room = 1e-12 * whole;
+      const double least = whole - d * shadow(mesh, direction), tolerance = 1e-12 * whole;
       for (const Penetration& found : {there, back}) {
         EXPECT_EQ(found.status, QueryStatus::ok);
         EXPECT_FALSE(found.touching);
-        EXPECT_GE(found.volume, least - room);
-        EXPECT_LE(found.volume, whole + room);
+        EXPECT_GE(found.volume, least - tolerance);
+        EXPECT_LE(found.volume, whole + tolerance);
         if (aside < 1e-8) {
-          EXPECT_NEAR(found.volume, least, room);
+          EXPECT_NEAR(found.volume, least, tolerance);
         }
         EXPECT_LE(found.volume_max - found.volume_min, 1e-10 * whole);
       }
-      EXPECT_NEAR(there.volume, back.volume, room);
+      EXPECT_NEAR(there.volume, back.volume, tolerance);
       EXPECT_LE((there.force + back.force).norm(), 1e-9 * size * size);
     }
   EXPECT_EQ(taken.bytes, reserved);

@@ -19,7 +19,7 @@ namespace {
 using testing::OracleRow;
 using Point = Eigen::Vector3d;
 
-// What the oracle says of itself: two exact kernels differ by as much.
+// The oracle's own error: two exact kernels differ by as much.
 constexpr double kOracleVolume = 1.3e-12;
 
 const Asset& surface_of(const std::filesystem::path& path) {
@@ -144,7 +144,7 @@ TEST_F(ExactOracle, EveryStepOfTheTrajectory) {
   EXPECT_LE(wide_, 40);  // first touches
 }
 
-/// Where a mesh of oracle/small lies.
+/// The path of a mesh of oracle/small.
 std::filesystem::path mesh_path(const std::string& name) {
   for (const char* const place :
        {"oracle/meshes/%.off", "meshes/dev/%.off", "meshes/dev/%.stl", "meshes/dev/%.ply"}) {
@@ -167,7 +167,7 @@ TEST_P(ExactOracleOfSmall, EveryRow) {
     const PlacedAsset a{surface_of(mesh_path(row.mesh_a)).view(), {}, 1};
     const PlacedAsset b{surface_of(mesh_path(row.mesh_b)).view(), row.pose, row.scale_b};
     const Penetration found = compare(a, b, row.volume, precision);
-    // By differences of volumes.
+    // Compares with differences of volumes.
     const double force = row.force.norm(), torque = row.torque.norm();
     EXPECT_LE((found.force - row.force).norm(), 1e-3 * force);
     EXPECT_LE((found.torque - row.torque).norm(), 1e-3 * (torque + force * row.scale_b));

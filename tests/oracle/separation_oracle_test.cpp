@@ -38,7 +38,7 @@ TEST(SeparationOracle, IntervalsHoldTheSolidsDistance) {
   EXPECT_LE(last_width, 0.03);
 }
 
-/// Of the surfaces: the distance itself, to the digits that the oracle has.
+/// The distance of the surfaces, to the oracle's digits.
 TEST(SeparationOracle, SurfacesAreAtTheSolidsDistance) {
   IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
   Workspace workspace;

@@ -43,7 +43,7 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
 }
 
-/// Of a class, in parts of the wanted error, and degrees.
+/// The errors of a class, relative to the wanted error, and in degrees.
 struct Found {
   std::vector<double> error, angle;
 };
@@ -119,8 +119,8 @@ std::vector<OracleRow> mated_rows() {
   return rows;
 }
 
-// What all spheres say is off by more than the solid; where nothing is more than rounding the
-// status may say that this is too much.
+// The spheres alone err by more than 1 % of the solid. If a volume is within rounding of 0, the
+// status may report that its error is too large.
 TEST(WantedErrorOracle, MatedSolidsErrByLess) {
   IST_NEEDS_SHARED("oracle/mated/poses.csv");
   Workspace workspace;

@@ -117,7 +117,7 @@ TEST_F(FlatFaces, PatchesLoseIt) {
     }
   }
 
-  // By the surface, and by inner spheres, nothing sticks out.
+  // The surface and inner spheres do not protrude.
   b.pose.t[0] = side_ + 0.05 * radius_;
   b.scale = 0.1;
   b.pose.t[0] -= 0.45 * side_;

@@ -1,4 +1,4 @@
-// check_glb FILE: that an animated .glb is what glTF 2.0 asks for, as far as the writer of
+// check_glb FILE: checks that an animated .glb conforms to glTF 2.0, as far as the writer of
 // examples/bullet uses it. Says what is wrong and exits 1.
 #include <cmath>
 #include <cstdint>

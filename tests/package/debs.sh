@@ -53,7 +53,7 @@ installed() {
   done
   sed -n "s/^\([^ ]*\) .*[ ,]$1[ ,].*/\1/p" "$work/provided" | head -n 1
 }
-# Of a list of dependencies the first alternative that is installed.
+# The first installed alternative of a list of dependencies.
 depends() {
   printf '%s\n' "$1" | tr ',' '\n' | while read -r alternatives; do
     printf '%s\n' "$alternatives" | tr '|' '\n' | sed 's/ *\([^ (:]*\).*/\1/' | while read -r name; do

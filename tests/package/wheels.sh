@@ -2,7 +2,7 @@
 # Wheels as users get them: each in new environments without packages of the system, with NumPy 1.26
 # and 2 where there are such, and the last with JAX, trimesh and MuJoCo. PyPI is asked for these alone,
 # and for models of MuJoCo's.
-# Of wheels with and without the GPU, those without, which have the version of the source package.
+# Tests the wheels without the GPU, which have the version of the source package.
 # usage: wheels.sh DIST FOLDER PYTHON…
 set -euo pipefail
 here=$(dirname "$(realpath "${BASH_SOURCE[0]}")")

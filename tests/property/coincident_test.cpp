@@ -54,7 +54,7 @@ class CoincidentInstances : public ::testing::Test {
   CoincidenceWeight weight(const PlacedAsset& b) const {
     return coincidence_weight(tree_.root, tree_.mean_radius, relative_pose(still(), b)->a_from_b);
   }
-  /// What is answered, over all pairs of spheres in double.
+  /// The expected answer, over all pairs of spheres in double.
   double reference(const PlacedAsset& b) const {
     const double w = weight(b).weight;
     return (1 - w) * reference_sum(still(), b, Measure::matched, 0, 0).volume +
@@ -85,9 +85,9 @@ TEST_F(CoincidentInstances, TheWeightFollowsTheMeanSquareDisplacement) {
                      .squaredNorm();
           n += 1;
         }
-    const double way = std::sqrt(sum / n) / radius_;
-    const double t = std::clamp((1.6 - way) / 1.2, 0.0, 1.0);
-    EXPECT_NEAR(weight(b).weight, t * t * (3 - 2 * t), 0.02) << way;
+    const double offset = std::sqrt(sum / n) / radius_;
+    const double t = std::clamp((1.6 - offset) / 1.2, 0.0, 1.0);
+    EXPECT_NEAR(weight(b).weight, t * t * (3 - 2 * t), 0.02) << offset;
     between += t > 0.1 && t < 0.9 ? 1 : 0;
   }
   EXPECT_GE(between, 8);
@@ -136,9 +136,9 @@ TEST_F(CoincidentInstances, NothingJumpsAsTheyPart) {
       Penetration before;
       for (int i = 0; i <= steps; ++i) {
         // From where equal spheres no longer coincide.
-        const double way = (0.2 + 2.0 * i / steps) * radius_;
+        const double offset = (0.2 + 2.0 * i / steps) * radius_;
         const Penetration now =
-            penetration(still(), placed(small_pose(way * direction, {0, 0, 0.01})),
+            penetration(still(), placed(small_pose(offset * direction, {0, 0, 0.01})),
                         {.pair_budget = budget}, workspace_);
         const std::array changes = {std::abs(now.volume - before.volume),
                                     (now.force - before.force).norm(),
@@ -192,7 +192,7 @@ TEST(CoincidentInstancesOfASolid, ACopyOnItselfReadsItsVolume) {
     const PlacedAsset one{asset.view(), {}, 1};
     Workspace workspace;
     EXPECT_NEAR(penetration(one, one, {}, workspace).volume, volume, 0.025 * volume) << name;
-    // What it is to avert.
+    // The effect that it prevents.
     EXPECT_GT(reference_sum(one, one, Measure::matched).volume, 1.05 * volume) << name;
     // Elsewhere in memory it is the same asset.
     const Asset copy(asset.bytes(), "copy");

@@ -219,7 +219,7 @@ TEST(ContactPatchesTest, RefusesWhatPenetrationRefuses) {
   EXPECT_EQ(answer.count, 0u);
   EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_input);
   EXPECT_TRUE(std::isnan(answer.penetration.volume));
-  // Neither asset holds a mesh.
+  // Neither asset has a mesh.
   const PlacedAsset placed{a.view(), {}, 1};
   const ContactPatches exact =
       contact_patches(placed, placed, {.measure = Measure::exact}, workspace, {&patch, 1});
@@ -227,7 +227,7 @@ TEST(ContactPatchesTest, RefusesWhatPenetrationRefuses) {
   EXPECT_EQ(exact.count, 0u);
 }
 
-TEST(ContactPatchesTest, RefusesNumbersThatNameNothingAndNoRoom) {
+TEST(ContactPatchesTest, RefusesNumbersThatNameNothingAndNoCapacity) {
   Workspace workspace;
   const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
   const PlacedAsset placed{a.view(), {}, 1}, other{a.view(), {{1, 0, 0, 0}, {0.3, 0, 0}}, 1};
@@ -261,7 +261,7 @@ TEST(WorkspaceDeathTest, TwoThreadsInOneAreSaid) {
   Workspace workspace;
   const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
   const PlacedAsset placed{a.view(), {}, 1};
-  // A field that asks on another thread what its own query asks on this one.
+  // A field that runs on another thread the query that its own query runs on this one.
   struct Both {
     Workspace& workspace;
     PlacedAsset placed;

@@ -31,7 +31,7 @@ class ExactLoop : public ::testing::Test {
     return penetration({a.view(), {}, 1}, {b.view(), pose, 1}, settings, workspace_);
   }
 
-  /// Of all that an exact query gives, but for the nodes that it opened.
+  /// Compares all results of an exact query except node visits.
   std::uint64_t bits(const Asset& a, const Asset& b, const Pose& pose, std::uint32_t pair_id) {
     ContactSettings settings;
     settings.measure = Measure::exact;
@@ -121,7 +121,7 @@ TEST_F(ExactLoop, InClearanceNothingIsSearchedAndNothingTouches) {
   EXPECT_LE(searched, 80);
 }
 
-// Of a contact whose force is the gradient of ½ V², at 1 kHz: once around in a second.
+// The energy of a contact whose force is the gradient of ½ V², at 1 kHz: one turn a second.
 TEST_F(ExactLoop, AClosedPathGivesNoEnergy) {
   double sum = 0, all = 0;
   Eigen::Vector3d force, place;
@@ -170,8 +170,9 @@ TEST_F(ExactLoop, AnyUseOfNumbersGivesTheSameBits) {
     }
 }
 
-// A list that the workspace has no room for is given up. With less room yet nothing is finished.
-TEST_F(ExactLoop, RoomChangesNoBit) {
+// A list that does not fit into the workspace is given up. With even less memory nothing is
+// finished.
+TEST_F(ExactLoop, CapacityChangesNoBit) {
   const Asset ball = testing::surface(testing::icosphere_mesh(4));
   for (std::size_t capacity = 4000; capacity < 40000; capacity += capacity / 8) {
     Workspace small(capacity);

@@ -88,8 +88,8 @@ TEST(ExactMated, WhatMeetsAlongEdgesAllRoundTouches) {
   }
 }
 
-// Where no side of a solid's box is apart, near faces that do not touch are told apart by planes,
-// not by the distance of each two triangles.
+// If no side of a solid's box separates them, planes separate near faces that do not touch; the
+// distance of each two triangles is not computed.
 TEST(ExactMated, FacesNextToEachOtherCostWhatFacesOnEachOtherDo) {
   TriangleMesh askew = testing::Extrusion::tube(500, 1, 0.8, 0, 1).mesh();
   const Eigen::Quaterniond turn = Eigen::Quaterniond(0.8, 0.4, 0.3, 0.2).normalized();

@@ -58,8 +58,8 @@ TriangleMesh tilted(TriangleMesh mesh) {
 class ExactOctants : public ::testing::Test {
  protected:
   const std::vector<ContactPatch>& ask(const PlacedAsset& a, const PlacedAsset& b,
-                                       std::size_t room = 64) {
-    patches_.assign(room, {});
+                                       std::size_t capacity = 64) {
+    patches_.assign(capacity, {});
     const ContactSettings settings{.measure = Measure::exact};
     const ContactPatches found = contact_patches(a, b, settings, workspace_, patches_);
     whole_ = found.penetration;
@@ -118,7 +118,7 @@ TEST_F(ExactOctants, SumToTheWholeInAnyPose) {
         t(any(random), any(random), any(random));
     const PlacedAsset b{assets[i / 4 % 4].view(), turned(axis, 3 * any(random), 1.6 * t),
                         std::exp(any(random))};
-    for (const std::size_t room : {1, 3, 64}) divided += ask(a, b, room).size() > 1 ? 1 : 0;
+    for (const std::size_t capacity : {1, 3, 64}) divided += ask(a, b, capacity).size() > 1 ? 1 : 0;
   }
   EXPECT_GT(divided, 80u);
 }
@@ -187,7 +187,7 @@ TEST_F(ExactOctants, AFineFaceIsDividedLikeACoarseOne) {
       EXPECT_LE((one[i].centroid - other[i].centroid).norm(), 1e-11);
       EXPECT_LE((one[i].force - other[i].force).norm(), 1e-13);
       EXPECT_LE((one[i].torque - other[i].torque).norm(), 1e-13);
-      // The same either way round.
+      // The same in either order.
       if (!a_is_table) {
         EXPECT_LE((one[i].force + before[i].force).norm(), 1e-13);
       }
@@ -241,11 +241,11 @@ TEST_F(ExactOctants, ARingHoldsItsShaftAllAround) {
   ASSERT_GE(patches.size(), 8u);
   double highest = 0;
   for (const double turn : {0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0}) {
-    const Point way(std::cos(turn), std::sin(turn), 0);
+    const Point direction(std::cos(turn), std::sin(turn), 0);
     double with = 0, against = 0;
     for (const ContactPatch& patch : patches) {
-      with += std::max(0.0, patch.force.dot(way));
-      against += std::max(0.0, -patch.force.dot(way));
+      with += std::max(0.0, patch.force.dot(direction));
+      against += std::max(0.0, -patch.force.dot(direction));
       highest = std::max(highest, std::abs(patch.normal.z()));
     }
     EXPECT_GT(with, 1);  // 0.8 · 2 where all of the ring touches: its area over π
@@ -262,11 +262,11 @@ TEST_F(ExactOctants, AThreadHoldsAllAround) {
   const Point axial(0, 0, whole().force.z() > 0 ? 1 : -1);
   for (int quarter = 0; quarter < 4; ++quarter) {
     const double turn = (quarter + 0.5) * kPi / 2;
-    const Point way(std::cos(turn), std::sin(turn), 0);
+    const Point direction(std::cos(turn), std::sin(turn), 0);
     double most = 0;  // of a patch there that pushes along the axis and away from it
     for (const ContactPatch& patch : patches)
-      if (patch.point.dot(way) > 2 && patch.normal.dot(axial) > 0.5)
-        most = std::max(most, patch.normal.dot(way));
+      if (patch.point.dot(direction) > 2 && patch.normal.dot(axial) > 0.5)
+        most = std::max(most, patch.normal.dot(direction));
     EXPECT_GT(most, 0.1);
   }
 }
@@ -290,9 +290,9 @@ TEST_F(ExactOctants, AThinContactIsNotCutAlongItsFace) {
   const Asset table = surface(box_mesh(Point(-9, -9, -1), Point(9, 9, 0)));
   const Asset foot = surface(box_mesh(Point(-1, -1, 0), Point(1, 1, 1)));
   for (int k = 0; k < 12; ++k) {
-    const double way = 0.1 + k * std::numbers::pi / 6;
-    const Pose pose = turned(Point(std::cos(way), std::sin(way), 0), 1e-3, {0, 0, -2e-3});
-    EXPECT_EQ(ask({table.view(), {}, 1}, {foot.view(), pose, 1}).size(), 4u) << way;
+    const double angle = 0.1 + k * std::numbers::pi / 6;
+    const Pose pose = turned(Point(std::cos(angle), std::sin(angle), 0), 1e-3, {0, 0, -2e-3});
+    EXPECT_EQ(ask({table.view(), {}, 1}, {foot.view(), pose, 1}).size(), 4u) << angle;
   }
 }
 
@@ -300,15 +300,15 @@ TEST_F(ExactOctants, ASmallFootKeepsItsPatchWhereRoomIsShort) {
   const Asset table = surface(box_mesh(Point(-9, -9, -1), Point(9, 9, 0)));
   const Asset feet = surface(testing::joined(box_mesh(Point(-1, -1, 0), Point(1, 1, 1)),
                                              box_mesh(Point(4, -0.1, 0), Point(4.2, 0.1, 1))));
-  for (const std::size_t room : {64, 5, 4, 2}) {
+  for (const std::size_t capacity : {64, 5, 4, 2}) {
     const auto& patches =
-        ask({table.view(), {}, 1}, {feet.view(), {{1, 0, 0, 0}, {0, 0, -0.01}}, 1}, room);
+        ask({table.view(), {}, 1}, {feet.view(), {{1, 0, 0, 0}, {0, 0, -0.01}}, 1}, capacity);
     double small = 0;
     for (const ContactPatch& patch : patches) {
       EXPECT_GE(patch.id, 8u);
       if (std::abs(patch.centroid.x() - 4.1) < 0.11) small += patch.volume;
     }
-    EXPECT_NEAR(small, 0.2 * 0.2 * 0.01, 1e-14) << room;
+    EXPECT_NEAR(small, 0.2 * 0.2 * 0.01, 1e-14) << capacity;
   }
 }
 
@@ -318,12 +318,12 @@ TEST_F(ExactOctants, CrumbsBesideAContactTakeNoneOfItsRoom) {
   for (int k = -7; k <= 7; ++k)
     feet = testing::joined(feet, box_mesh(Point(1.1, 0.1 * k, 0), Point(1.15, 0.1 * k + 0.05, 1)));
   const Asset foot = surface(feet);
-  for (const std::size_t room : {16, 8, 5}) {
+  for (const std::size_t capacity : {16, 8, 5}) {
     const auto& patches =
-        ask({table.view(), {}, 1}, {foot.view(), {{1, 0, 0, 0}, {0, 0, -0.01}}, 1}, room);
-    EXPECT_EQ(patches.size(), room);
+        ask({table.view(), {}, 1}, {foot.view(), {{1, 0, 0, 0}, {0, 0, -0.01}}, 1}, capacity);
+    EXPECT_EQ(patches.size(), capacity);
     const auto quarter = [](const ContactPatch& p) { return std::abs(p.volume - 0.01) < 1e-3; };
-    EXPECT_EQ(std::count_if(patches.begin(), patches.end(), quarter), 4) << room;
+    EXPECT_EQ(std::count_if(patches.begin(), patches.end(), quarter), 4) << capacity;
   }
 }
 
@@ -336,7 +336,7 @@ TEST_F(ExactOctants, WhatIsDeepIsOne) {
             1u);
 }
 
-/// The largest change of a patch over a step along a path, patches told by their octants.
+/// The largest change of a patch over a step along a path, patches identified by their octants.
 TEST_F(ExactOctants, AreContinuous) {
   struct Case {
     Asset a, b;

@@ -29,7 +29,7 @@ TriangleMesh joined(const std::vector<TriangleMesh>& meshes) {
   return all;
 }
 
-/// Four legs of 0.2 × 0.2, 1 high, that stand at the corners of a square.
+/// Four legs of 0.2 × 0.2, 1 high, at the corners of a square.
 TriangleMesh legs() {
   std::vector<TriangleMesh> all;
   for (const double x : {-1.0, 0.8})
@@ -40,14 +40,14 @@ TriangleMesh legs() {
 
 class ExactPatches : public ::testing::Test {
  protected:
-  OverlapOutline ask(const PlacedAsset& a, const PlacedAsset& b, std::size_t room = 64) {
-    patches_.assign(room, {});
+  OverlapOutline ask(const PlacedAsset& a, const PlacedAsset& b, std::size_t capacity = 64) {
+    patches_.assign(capacity, {});
     segments_.assign(5000, {});
     OverlapOutline found = overlap_outline(a, b, {}, workspace_, patches_, segments_);
     EXPECT_LE(found.segments, segments_.size());
     segments_.resize(std::min(found.segments, segments_.size()));
     patches_.resize(found.contact.count);
-    expect_whole(a, b, found, room);
+    expect_whole(a, b, found, capacity);
     expect_outlines(b.pose);
     return found;
   }
@@ -55,9 +55,9 @@ class ExactPatches : public ::testing::Test {
   const std::vector<ContactPatch>& patches() const { return patches_; }
 
  private:
-  /// The patches sum to what a penetration answers.
+  /// The patches sum to a penetration's answer.
   void expect_whole(const PlacedAsset& a, const PlacedAsset& b, const OverlapOutline& found,
-                    std::size_t room) {
+                    std::size_t capacity) {
     const Penetration whole = testing::exactly(a, b, workspace_);
     EXPECT_EQ(found.contact.penetration.volume, whole.volume);
     double volume = 0;
@@ -76,7 +76,7 @@ class ExactPatches : public ::testing::Test {
     EXPECT_LE((torque - whole.torque).norm(), 1e-14 * area * size);
     EXPECT_LE((moment - whole.volume * whole.centroid).norm(), 1e-14 * area * area);
     // contact_patches() divides them.
-    std::vector<ContactPatch> same(room);
+    std::vector<ContactPatch> same(capacity);
     ContactSettings settings;
     settings.measure = Measure::exact;
     EXPECT_GE(contact_patches(a, b, settings, workspace_, same).count, patches_.size());
@@ -116,7 +116,7 @@ TEST_F(ExactPatches, FourLegsOnAPlate) {
     EXPECT_NEAR(patch.depth, 0.1, 1e-13);
     EXPECT_NEAR(patch.centroid.z(), -0.05, 1e-14);
   }
-  // The other way round, and where there is room for two alone.
+  // In the other order, and with memory for only two.
   ask({table.view(), {}, 1}, {plate.view(), {{1, 0, 0, 0}, {0.1, 0.05, 0.1}}, 1});
   EXPECT_EQ(patches().size(), 4u);
   ask({plate.view(), {}, 1}, {table.view(), {{1, 0, 0, 0}, {0.1, 0.05, -0.1}}, 1}, 2);

@@ -58,7 +58,7 @@ class ExactPlaces : public ::testing::Test {
   const Asset cube_ = surface(box_mesh(Point::Zero(), Point::Ones()));
 };
 
-/// Of [0, 1] and [t, 1 + t].
+/// The overlap of [0, 1] and [t, 1 + t].
 double common(double t) { return std::max(0.0, 1 - std::abs(t)); }
 
 TEST_F(ExactPlaces, CubesOnALattice) {
@@ -96,13 +96,13 @@ TEST_F(ExactPlaces, PlatesFlushWithACube) {
         for (const double x : {0.0, 0.25, 0.5, -0.5, 1.0}) {
           const double top = std::min(1.0, z + thick), low = std::max(0.0, z);
           const double along = std::min(1.0, x + width) - std::max(0.0, x);
-          // As the pose adds to the plate, and the plate's own thickness, in double.
+          // The pose and the plate's own thickness are added in double.
           const double truth = std::max(0.0, along) * std::min(width, 1.0) *
                                (z >= 0 && z + thick <= 1 ? thick : std::max(0.0, top - low));
           SCOPED_TRACE(::testing::Message() << thick << ' ' << width << ' ' << z << ' ' << x);
           const Penetration found =
               ask({cube_.view(), {}, 1}, {plate.view(), shifted({x, 0, z}), 1});
-          // Where the frame of the plate rounds its place, its thickness is off by that.
+          // If the plate's frame rounds its place, its thickness has that error.
           EXPECT_NEAR(found.volume, truth, 1e-13 * truth + 4e-16 * width * width);
           EXPECT_LE(found.volume_min, truth + 1e-16 * width * width);
           EXPECT_GE(found.volume_max, truth - 1e-16 * width * width);
@@ -189,12 +189,12 @@ TEST_F(ExactPlaces, RatiosToAMillionth) {
     for (int i = 0; i < 27; ++i) {
       const double at[3] = {-s / 2, 0.5, 1 - s / 4};
       const double inside[3] = {s / 2, s, s / 4};
-      const int way[3] = {i % 3, i / 3 % 3, i / 9};
+      const int cell[3] = {i % 3, i / 3 % 3, i / 9};
       double truth = 1;
       Point t;
       for (int axis = 0; axis < 3; ++axis) {
-        t[axis] = at[way[axis]];
-        truth *= inside[way[axis]];
+        t[axis] = at[cell[axis]];
+        truth *= inside[cell[axis]];
       }
       SCOPED_TRACE(::testing::Message() << k << ": " << t.transpose());
       expect_volume({cube_.view(), {}, 1}, {cube_.view(), shifted(t), s}, truth, 1e-13);
@@ -232,14 +232,14 @@ class ExactMotions : public ExactPlaces {
   std::vector<Pair> pairs() {
     std::mt19937_64 random(5);
     std::uniform_real_distribution<double> unit(-1, 1);
-    const auto way = [&] { return Point(unit(random), unit(random), unit(random)); };
+    const auto draw = [&] { return Point(unit(random), unit(random), unit(random)); };
     std::vector<Pair> made;
     for (int i = 0; i < 60; ++i) {
       const Asset& a = assets_[static_cast<std::size_t>(i) % assets_.size()];
       const Asset& b = assets_[static_cast<std::size_t>(i / 2) % assets_.size()];
       made.push_back(
-          {{a.view(), posed(testing::random_turn(random), way()), 1},
-           {b.view(), posed(testing::random_turn(random), way()), std::pow(2, unit(random))}});
+          {{a.view(), posed(testing::random_turn(random), draw()), 1},
+           {b.view(), posed(testing::random_turn(random), draw()), std::pow(2, unit(random))}});
     }
     return made;
   }
@@ -272,7 +272,7 @@ TEST_F(ExactMotions, TheSameWithAAndBExchanged) {
               std::min(found.volume_max, other.volume_max));
     EXPECT_TRUE(found.force.isApprox(other.force, 1e-12) ||
                 (found.force + other.force).norm() < 1e-13);
-    // Of the other solid, about the other origin.
+    // The wrench on the other solid, about the other origin.
     const Point torque = other.torque + (origin(a) - origin(b)).cross(other.force);
     EXPECT_LE((found.torque + torque).norm(), 1e-13);
     EXPECT_LE((found.centroid - other.centroid).norm() * found.volume, 1e-13);
@@ -324,7 +324,7 @@ TEST_F(ExactMotions, GradientsAreThoseOfTheVolume) {
 }
 
 TEST_F(ExactMotions, CentroidIsThatOfTheOverlap) {
-  // Of boxes it is known; of the whole of a contained solid, its own.
+  // Known for boxes; for a contained solid, its own volume.
   const Penetration found =
       ask({cube_.view(), {}, 1}, {cube_.view(), shifted({0.5, 0.25, -0.75}), 1});
   EXPECT_LE((found.centroid - Point(0.75, 0.625, 0.125)).norm(), 1e-15);
@@ -358,10 +358,10 @@ TEST_F(ExactLimits, GiveTheAnswerOfTheSpheres) {
   ASSERT_EQ(truth.status, QueryStatus::ok);
   PenetrationSettings limited = exact;
   limited.max_visits = 3;
-  const Penetration of_room = penetration(a, b, exact, small);
+  const Penetration of_capacity = penetration(a, b, exact, small);
   const Penetration of_visits = penetration(a, b, limited, workspace_);
-  for (const auto& [found, asked, workspace] :
-       {std::tuple(&of_room, &spheres, &small), std::tuple(&of_visits, &spheres, &workspace_)}) {
+  for (const auto& [found, asked, workspace] : {std::tuple(&of_capacity, &spheres, &small),
+                                                std::tuple(&of_visits, &spheres, &workspace_)}) {
     EXPECT_EQ(found->status, QueryStatus::budget_exhausted);
     PenetrationSettings same = *asked;
     same.max_visits = found == &of_visits ? 3 : 0;
@@ -370,7 +370,7 @@ TEST_F(ExactLimits, GiveTheAnswerOfTheSpheres) {
     EXPECT_EQ(found->force, matched.force);
     EXPECT_EQ(found->torque, matched.torque);
     EXPECT_EQ(found->centroid, matched.centroid);
-    // What is certain of the true volume.
+    // Certain bounds of the true volume.
     EXPECT_LE(found->volume_min, truth.volume);
     EXPECT_GE(found->volume_max, truth.volume);
   }
@@ -399,14 +399,14 @@ TEST_F(ExactLimits, WithoutAMeshNothingIsHeld) {
   EXPECT_EQ(testing::exactly(b, a, workspace_).status, QueryStatus::missing_data);
 }
 
-// However much room there is, once it is enough.
-TEST_F(ExactLimits, RoomNeverChangesAnAnswer) {
+// The amount of memory does not matter once it is enough.
+TEST_F(ExactLimits, MemoryNeverChangesAnAnswer) {
   const PlacedAsset a{ball_.view(), {}, 1}, b{ball_.view(), near_, 1};
   const Penetration truth = ask(a, b);
   int enough = 0;
   for (std::size_t capacity = 1; capacity < 1u << 16; capacity *= 2) {
-    Workspace room(capacity);
-    const Penetration found = testing::exactly(a, b, room);
+    Workspace memory(capacity);
+    const Penetration found = testing::exactly(a, b, memory);
     if (found.status == QueryStatus::budget_exhausted) {
       EXPECT_EQ(enough, 0);
       continue;

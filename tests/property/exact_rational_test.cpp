@@ -59,7 +59,7 @@ class ExactRational : public ::testing::Test {
   /// `b` as it lies before its pose.
   void compare(const TriangleMesh& a, const Asset& asset_a, const TriangleMesh& b,
                const Asset& asset_b, const Pose& pose, const std::string& what) {
-    // Where faces of one mesh cross its points are rounded, no more.
+    // If faces of one mesh cross, its points are only rounded.
     ASSERT_LE(asset_a.view().mesh_error() + asset_b.view().mesh_error(), 1e-14) << what;
     const Rational truth = testing::rational_overlap(a, moved(b, pose));
     const PlacedAsset placed_a{asset_a.view(), {}, 1}, placed_b{asset_b.view(), pose, 1};
@@ -102,7 +102,7 @@ TEST_F(ExactRational, RandomMeshesInCubeTurns) {
       const TriangleMesh mesh_b = turn.quarter ? quarter_turned(b) : b;
       Pose pose;
       std::copy(turn.q, turn.q + 4, pose.q);
-      // By integers, sixteenths and 2⁻²⁰.
+      // Displacements by integers, sixteenths and 2⁻²⁰.
       const double step = k > 0 ? 0 : i % 4 == 0 ? 0x1p-20 : 0.0625;
       for (double& t : pose.t) t = random.whole(-4, 4) + step * random.whole(-9, 9);
       compare(a, asset_a, mesh_b, testing::surface(mesh_b), pose,
@@ -124,7 +124,7 @@ TEST_F(ExactRational, CopiesAndNeighboursOfTheSameMesh) {
     Eigen::AlignedBox3d box;
     for (const Point& v : a.vertices) box.extend(v);
     for (int k = 0; k < 4; ++k) {
-      // By sides of its box and differences of its corners.
+      // Displacements by sides of its box and differences of its corners.
       for (double& t : pose.t) t = 0;
       if (k < 2) {
         const int axis = random.whole(0, 2);
@@ -132,9 +132,9 @@ TEST_F(ExactRational, CopiesAndNeighboursOfTheSameMesh) {
         if (k == 1) pose.t[(axis + 1) % 3] = random.whole(-2, 2);
       } else {
         const int last = static_cast<int>(a.vertices.size()) - 1;
-        const Point way = a.vertices[static_cast<std::size_t>(random.whole(0, last))] -
-                          a.vertices[static_cast<std::size_t>(random.whole(0, last))];
-        std::copy(way.data(), way.data() + 3, pose.t);
+        const Point between = a.vertices[static_cast<std::size_t>(random.whole(0, last))] -
+                              a.vertices[static_cast<std::size_t>(random.whole(0, last))];
+        std::copy(between.data(), between.data() + 3, pose.t);
       }
       compare(a, asset, a, asset, pose, "neighbour " + std::to_string(i) + ' ' + std::to_string(k));
     }

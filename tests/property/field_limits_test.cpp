@@ -65,7 +65,7 @@ TEST(UnlikePairs, LimitsKeepTrueBounds) {
       const Penetration full = penetration(a, b, {}, large);
       for (const auto& [limit, settings] : limits())
         expect_bounds(pair.name, limit, penetration(a, b, settings, large), full);
-      // As many visits as the lenses take, or about: none is left for the meshes.
+      // About as many visits as the lenses take: none is left for the meshes.
       const std::uint32_t visits = penetration(a, b, {.spheres_only = true}, large).node_visits;
       for (const std::uint32_t more : {0u, 1u, 2u, 3u, 5u})
         expect_bounds(pair.name, "lenses' visits",
@@ -83,7 +83,7 @@ void expect_shares(const char* name, const ContactPatches& got, const Penetratio
   EXPECT_EQ(got.penetration.node_visits, whole.node_visits) << name;
   EXPECT_EQ(got.penetration.force, whole.force) << name;
   EXPECT_EQ(got.penetration.torque, whole.torque) << name;
-  // Where a stopped query has summed nothing yet there is nothing to divide.
+  // If a stopped query has summed nothing yet, there is nothing to divide.
   if (whole.status == QueryStatus::ok) {
     EXPECT_EQ(got.count > 0, whole.volume > 0) << name;
   }

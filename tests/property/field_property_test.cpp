@@ -20,17 +20,17 @@ namespace {
 
 using namespace testing;
 
-/// The volume changes by what its gradients say, along short ways in all directions. `rounding`:
+/// The volume changes by what its gradients say, along short motions in all directions. `rounding`:
 /// relative, of a volume.
-void expect_gradients(const char* name, const Ask& ask, const Pose& pose, double way,
+void expect_gradients(const char* name, const Ask& ask, const Pose& pose, double length,
                       double rounding, std::mt19937_64& random) {
   for (int kind = 0; kind < 3; ++kind) {
     Sweep motion{pose};
-    if (kind != 1) motion.v = way * random_direction(random);
-    if (kind != 0) motion.w = 2 * way * random_direction(random);
+    if (kind != 1) motion.v = length * random_direction(random);
+    if (kind != 0) motion.w = 2 * length * random_direction(random);
     const Work work = work_of(ask, motion, 40);
     // Simpson's rule meets kinks of the force wherever a ball begins to touch; torques may cancel.
-    const double slack = 1e-3 * work.moved + 1e-6 * way * std::pow(work.most, 2.0 / 3);
+    const double slack = 1e-3 * work.moved + 1e-6 * length * std::pow(work.most, 2.0 / 3);
     EXPECT_NEAR(work.done, work.change, slack + rounding * work.most) << name
                                                                       << (kind == 0   ? " along"
                                                                           : kind == 1 ? " about"
@@ -112,7 +112,7 @@ TEST(FieldQuery, TwoFieldsHoldNoSpheres) {
 
 TEST(FieldQuery, CylindersRimIsMetByEveryBall) {
   // Past the rim a ball is beside the mantle and above the end, and has a part of either: nodes may
-  // not be left out by their way to the rim.
+  // not be left out by their distance to the rim.
   Workspace workspace;
   const Asset one = make_random_asset({300, 0.3, {}, 0}, 5);
   const PlacedShape a{CylinderShape{0.4, 0.3}, {}, 1};
@@ -237,17 +237,18 @@ TEST(UnlikePairs, CarriedThroughAWall) {
   for (const bool thin : {true, false}) {
     const double half = thin ? 0.01 : 0.2;
     for (const Quaterniond& q : turns) {
-      for (const int way : {0, 1, 2}) {  // the wall as a field, as A, as B
+      for (const int order : {0, 1, 2}) {  // the wall as a field, as A, as B
         double last = 0, worst_jump = 0, error = 0, most = 0;
         constexpr int kSteps = 400;
         for (int i = 0; i <= kSteps; ++i) {
           const double z = -0.7 + 1.4 * i / kSteps;
           const PlacedAsset body{cube().view(), pose_of(q, {0.05, -0.1, z}), 0.5};
           const PlacedAsset wall{(thin ? plate() : slab()).view(), {}, 1};
-          const Penetration got = way == 0 ? penetration(PlacedShape{BoxShape{{1, 1, half}}, {}, 1},
-                                                         body, {}, workspace)
-                                  : way == 1 ? penetration(wall, body, exact, workspace)
-                                             : penetration(body, wall, exact, workspace);
+          const Penetration got =
+              order == 0
+                  ? penetration(PlacedShape{BoxShape{{1, 1, half}}, {}, 1}, body, {}, workspace)
+              : order == 1 ? penetration(wall, body, exact, workspace)
+                           : penetration(body, wall, exact, workspace);
           const double want =
               overlap_volume({Vector3d::Zero(), {1, 1, half}, Eigen::Matrix3d::Identity()},
                              {{0.05, -0.1, z}, Vector3d::Constant(0.25), q.toRotationMatrix()});
@@ -256,13 +257,13 @@ TEST(UnlikePairs, CarriedThroughAWall) {
           if (i > 0) worst_jump = std::max(worst_jump, std::abs(got.volume - last));
           last = got.volume;
         }
-        std::printf("%s wall, way %d: worst error %.3f of the most\n", thin ? "thin" : "thick", way,
-                    error / most);
-        // A section of the cube is no larger than √3 · side² (turned); the balls that stand for it
+        std::printf("%s wall, order %d: worst error %.3f of the most\n", thin ? "thin" : "thick",
+                    order, error / most);
+        // A section of the cube is no larger than √3 · side² (turned); the balls that represent it
         // have sections some tenths larger where their layers are.
-        EXPECT_LE(worst_jump, 1.5 * std::sqrt(3.0) * 0.25 * 1.4 / kSteps) << thin << ' ' << way;
-        // Balls of a layer cross a thin wall together: the cube's own faces are what is off.
-        EXPECT_LE(error, (way > 0 ? 1e-12 : thin ? 0.08 : 0.01) * most) << thin << ' ' << way;
+        EXPECT_LE(worst_jump, 1.5 * std::sqrt(3.0) * 0.25 * 1.4 / kSteps) << thin << ' ' << order;
+        // Balls of a layer cross a thin wall together: the error is that of the cube's own faces.
+        EXPECT_LE(error, (order > 0 ? 1e-12 : thin ? 0.08 : 0.01) * most) << thin << ' ' << order;
       }
     }
   }

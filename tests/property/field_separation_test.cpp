@@ -96,7 +96,8 @@ TEST(FieldQuery, SeparationIsTheNearestSpheres) {
   }
 }
 
-// Far over a large terrain whose heights are known to lie within bounds, nobody looks at all of it.
+// Far over a large terrain whose heights are known to lie within bounds, a query does not visit all
+// of it.
 TEST(FieldQuery, SeparationFromALargeTerrain) {
   Workspace workspace;
   std::vector<float> heights(1000 * 1000);

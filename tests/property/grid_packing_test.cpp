@@ -81,7 +81,7 @@ TEST(GridPacking, ShellsThatOverlapOrNestAreOneSolid) {
   expect_sound(testing::closed(hollow, "hollow ball"));
 }
 
-/// The distance grid is there for speed: what is packed depends on the prototype grid alone.
+/// The distance grid only serves speed: the packing depends on the prototype grid alone.
 TEST(GridPacking, TheDistanceGridDoesNotChangeABit) {
   const MeshSolid solid(close_mesh(make_sample("bolt"), "bolt"));
   const SpherePacking expected = pack(solid, small(GridMode::explicit_refinement, 400));

@@ -4,7 +4,7 @@
 #include "mesh/samples/samples.h"
 #include "support/baked.h"
 
-// A hand that is held to a proxy by a virtual coupling, examples/haptic_loop: over any way it gets
+// A hand that is held to a proxy by a virtual coupling, examples/haptic_loop: over any path it gets
 // no more than it put in, unless the coupling is too stiff for the rate.
 
 namespace ist {

@@ -8,8 +8,8 @@
 #include "support/float_traps.h"
 #include "support/impact_bodies.h"
 
-// Times of impact at the edge: solids that hold or slide along each other, limits that bind, input
-// that is none, sizes and places far off.
+// Times of impact at the edge: solids that contain or slide along each other, limits that bind,
+// input that is none, sizes and places far off.
 
 namespace ist {
 namespace {
@@ -178,7 +178,7 @@ TEST(TimeOfImpact, KnowsNoScaleOrPlace) {
         EXPECT_NEAR(found.time, want.time, far == 0 ? 0 : 1e-4);
       }
     }
-    // As fast again in half the time.
+    // Twice as fast in half the time.
     Motion fast = motion;
     fast.velocity *= 1e6;
     fast.angular_velocity *= 1e6;

@@ -11,7 +11,7 @@
 #include "query/impact/moving_frame.h"
 #include "support/impact_bodies.h"
 
-// What times of impact are made of: motions, and pairs of convex parts.
+// The parts of times of impact: motions, and pairs of convex parts.
 
 namespace ist {
 namespace {
@@ -27,7 +27,7 @@ TEST(Motions, LeadFromPoseToPose) {
     EXPECT_LE(motion.angular_velocity.norm() * 0.25, std::numbers::pi + 1e-12);
     const Eigen::Isometry3d end = to_isometry(moved(from, motion, 0.25, 2));
     EXPECT_LE((end.matrix() - to_isometry(to).matrix()).norm(), 1e-13);
-    // Half-way the point is half-way, and the rotation is the slerp.
+    // Half of the motion moves the point by half, and the rotation is the slerp.
     const Eigen::Isometry3d half = to_isometry(moved(from, motion, 0.125, 2));
     const Vector3d middle = (to_isometry(from) * (2 * about) + to_isometry(to) * (2 * about)) / 2;
     EXPECT_LE((half * Vector3d(2 * about) - middle).norm(), 1e-13);

@@ -116,7 +116,7 @@ class Triples {
 
 template <class T>
 double relative_excess(T got, const Exact& want) {
-  // Where a result is no normal number its digits are gone: that much is allowed for.
+  // A subnormal result has lost its digits, which is allowed for.
   const Exact floor = 8 * Exact(std::numeric_limits<T>::min());
   const Exact excess = abs(Exact(got) - want) - floor;
   return excess <= 0 ? 0 : static_cast<double>(excess / want);

@@ -14,7 +14,7 @@ namespace {
 using testing::make_random_asset;
 using testing::random_pose;
 
-/// Of all pairs of inner spheres and of covers, in double: what is certain.
+/// The certain answer, from all pairs of inner spheres and of covers, in double.
 struct Truth {
   bool spheres_meet = false, covers_meet = false;
 };
@@ -82,7 +82,7 @@ TEST(Overlap, NeedsTimeAndRoom) {
   EXPECT_EQ(overlap(pa, pa, taken), YesNo::yes);
 }
 
-/// Half a distance: what a bound may say.
+/// Half a distance: a valid bound.
 ShapeSample cautious_plane(const void*, const Eigen::Vector3d& x) noexcept {
   return {0.5 * x.z(), {0, 0, 0.5}};
 }

@@ -139,7 +139,7 @@ TEST(Packing, PowersOfTwoInScaleAndShiftDoNotChangeABit) {
 TEST(Packing, EverySphereKeepsTheGreedyPromiseUnderAnExplicitEpsilon) {
   // No random point may have a clearance above r / (1 − ε) when r is inserted. Checked before each
   // sphere against all earlier ones, so the promise is read more strictly than it is made: a round
-  // inserts disjoint spheres, of which none takes another's room.
+  // inserts disjoint spheres, so none takes another's place.
   std::mt19937 random(4);
   const double epsilon = 0.1;
   for (const auto& mesh : {box_mesh({0, 0, 0}, {1, 0.8, 0.6}), wavy_torus(random, 12, 8)}) {
@@ -213,7 +213,7 @@ TEST(Packing, OtherStopsAreMet) {
 }
 
 /// A legal setting means the same in every mode: a coverage of 0 is met by the first sphere, and
-/// what is reported on the way is a number in [0, 1].
+/// reported progress is a number in [0, 1].
 TEST(Packing, ACoverageOfNothingIsMetByTheFirstSphere) {
   const auto solid = make_solid(box_mesh({0, 0, 0}, {1, 1, 1}));
   for (const GridMode mode : {GridMode::banded, GridMode::uniform, GridMode::explicit_refinement,
@@ -293,7 +293,7 @@ TEST(Packing, AnalyticSolidsArePackedThroughTheirDistanceAlone) {
 
 TEST(Packing, PlateausEnd) {
   // A slab, a plate of a millionth of its width, a needle of a millionth of its length: many equal
-  // places, and bounds that do not tell them apart.
+  // places, and bounds that do not distinguish them.
   for (const double thickness : {0.01, 1e-6}) {
     const auto slab = make_solid(box_mesh({0, 0, 0}, {1, 1, thickness}));
     const SpherePacking packing = pack(*slab, count(200));

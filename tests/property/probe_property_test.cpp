@@ -69,7 +69,7 @@ ProbeBalls probes_of(const std::vector<Ball>& balls) {
   return probes;
 }
 
-/// The parts of at most sixteen balls, as a query takes them; ways to their centres begin at
+/// The parts of at most sixteen balls, as a query takes them; lines to their centres begin at
 /// `outside`.
 std::vector<Part> parts_of(const TriangleMesh& mesh, const std::vector<Ball>& balls,
                            const Vector3d& outside) {
@@ -128,14 +128,14 @@ double sector_area(const Eigen::Vector2d& p, const Eigen::Vector2d& q, double ra
   const auto arc = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
     return 0.5 * radius * radius * std::atan2(cross(a, b), a.dot(b));
   };
-  const Eigen::Vector2d way = q - p;
-  const double a = way.squaredNorm(), b = p.dot(way), c = p.squaredNorm() - radius * radius;
+  const Eigen::Vector2d edge = q - p;
+  const double a = edge.squaredNorm(), b = p.dot(edge), c = p.squaredNorm() - radius * radius;
   const double root = b * b - a * c;
   if (!(a > 0)) return 0;
   if (!(root > 0)) return arc(p, q);
   const double t1 = std::clamp((-b - std::sqrt(root)) / a, 0.0, 1.0);
   const double t2 = std::clamp((-b + std::sqrt(root)) / a, 0.0, 1.0);
-  const Eigen::Vector2d u = p + t1 * way, v = p + t2 * way;
+  const Eigen::Vector2d u = p + t1 * edge, v = p + t2 * edge;
   if (t1 == t2) return arc(p, q);
   return arc(p, u) + 0.5 * cross(u, v) + arc(v, q);
 }
@@ -147,8 +147,8 @@ double section(const TriangleMesh& mesh, const Ball& ball, double z) {
   if (!(radius2 > 0)) return 0;
   double area = 0;
   for (const auto& t : mesh.triangles) {
-    // The outline enters through an edge that rises and leaves through one that falls, or the other
-    // way about; which, the triangle's order of corners tells.
+    // The outline enters through an edge that rises and leaves through one that falls, or the
+    // reverse, by the triangle's order of corners.
     Eigen::Vector2d up, down;
     int found = 0;
     for (int k = 0; k < 3; ++k) {
@@ -168,7 +168,7 @@ struct Slices {
   double volume = 0, moment_z = 0;
 };
 
-/// By slices along z, split at the corners.
+/// Integrates slices along z, split at the corners.
 Slices by_slices(const TriangleMesh& mesh, const Ball& ball) {
   std::vector<double> at = {ball.centre.z() - ball.r, ball.centre.z() + ball.r};
   for (const Vector3d& v : mesh.vertices)
@@ -259,8 +259,8 @@ TEST(Probe, PartsAgainstSlices) {
           std::max(worst_moment, std::abs(got.moment.z() - want.moment_z) / (r3 * ball.r));
     }
     std::printf("%s: volume %.2g r³, moment %.2g r⁴\n", shape.name, worst, worst_moment);
-    // What the integral over slices itself is good for: its integrand has roots where a slice comes
-    // to touch an edge, and needles have many.
+    // The accuracy of the integral over slices: its integrand has square roots where a slice
+    // begins to touch an edge, and needles have many.
     EXPECT_LE(worst, 3e-8) << shape.name;
     EXPECT_LE(worst_moment, 3e-8) << shape.name;
   }
@@ -337,7 +337,7 @@ TEST(Probe, CuttingTrianglesChangesNothing) {
       worst_moment = std::max(worst_moment, (a.moment - b.moment).norm() / (r * r * r * r));
     }
     // Rounding grows as the mesh's size over the ball's, 200 at most, and as the ball's radius over
-    // its centre's way to the nearest edge, some 100 in so many tries.
+    // its centre's distance to the nearest edge, some 100 in so many tries.
     EXPECT_LE(worst, 1e-11) << shape.name;
     EXPECT_LE(worst_pull, 1e-12) << shape.name;
     EXPECT_LE(worst_moment, 1e-12) << shape.name;
@@ -370,7 +370,7 @@ TEST(Probe, FarInsideIsAllAndFarOutsideNothing) {
     Ball out = in;
     out.centre[i % 3] += 2.1;
     EXPECT_EQ(part_of(box, out).volume, 0);
-    // A ball that holds the whole box.
+    // A ball that contains the whole box.
     const Ball around{in_box(random, Vector3d::Ones()), 4};
     EXPECT_NEAR(part_of(box, around).volume, 8, 1e-13 * 64);
     EXPECT_LE(part_of(box, around).gradient.norm(), 1e-13 * 16);
@@ -423,7 +423,7 @@ TEST(Probe, CentreNearAnEdge) {
     const Eigen::Quaterniond q = random_turn(random);
     const Part got = part_of(turned(box, q, Vector3d::Zero()),
                              {q * Vector3d(1 + a * r, 1 + b * r, 0.3 * uniform(random)), r});
-    // A quarter ball, and half discs over the ways; second order in them.
+    // A quarter ball, and half discs times the displacements; second order in them.
     const double want = 0.25 * 4 * std::numbers::pi / 3 - (a + b) * std::numbers::pi / 2;
     const double error = std::abs(got.volume / (r * r * r) - want) - 2 * away * away;
     if (error > worst) worst = error, at = away;

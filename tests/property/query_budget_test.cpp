@@ -36,7 +36,7 @@ double smaller_volume(const PlacedAsset& a, const PlacedAsset& b) {
   return std::min(volume(a), volume(b));
 }
 
-/// The stopped answer's bounds hold the finished one, and its volume lies between them.
+/// The stopped answer's bounds contain the finished one, and its volume lies between them.
 void expect_bounds(const Penetration& stopped, const Penetration& finished) {
   EXPECT_LE(stopped.volume_min, finished.volume);
   EXPECT_GE(stopped.volume_max, finished.volume);

@@ -65,7 +65,7 @@ class QueryDetails : public ::testing::Test {
             SphereTree(b.asset.header(), matched_tree(b.asset.header(), pair.b))};
   }
 
-  /// What a quick look sees, summed in double.
+  /// The coarse estimate of quick_look(), summed in double.
   static QuickLook look(const PlacedAsset& a, const PlacedAsset& b) {
     const auto [tree_a, tree_b] = coarsest(a, b);
     const Similarity map = relative_pose(a, b)->a_from_b;
@@ -79,11 +79,11 @@ class QueryDetails : public ::testing::Test {
       map.apply(of_b.centre, centre);
       for (std::uint32_t k = 0; k < tree_a.count(0); ++k) {
         const NodeBall of_a = tree_a.ball(0, k);
-        const Vector3d way = Vector3d(centre) - Vector3d(of_a.centre);
-        const Lens<double> both = lens(of_a.r, of_b.r * map.scale, way.norm());
+        const Vector3d between = Vector3d(centre) - Vector3d(of_a.centre);
+        const Lens<double> both = lens(of_a.r, of_b.r * map.scale, between.norm());
         const double filled =
             fill(of_a, tree_a.sums(0, k).volume) * fill(of_b, tree_b.sums(0, j).volume);
-        const Vector3d push = filled * both.derivative() * way.normalized();
+        const Vector3d push = filled * both.derivative() * between.normalized();
         sum.volume += filled * both.volume();
         sum.slope.by_translation = sum.slope.by_translation + plain(push);
         sum.slope.by_rotation =
@@ -206,7 +206,7 @@ TEST_F(QueryDetails, AnswerTheBlendedSumAndItsGradient) {
   EXPECT_GE(blended, 12) << "the poses blend nothing";
 }
 
-// Where a quick look makes half sure of the finest level, and the coarse estimate of none.
+// A pose where the quick look gives the finest level half the weight, and the coarse estimate none.
 TEST_F(QueryDetails, AnswerWhatAQuickLookBlendsAndItsGradient) {
   int blended = 0;
   for (int i = 0; i < 150 && blended < 12; ++i) {
@@ -251,8 +251,8 @@ TEST_F(QueryDetails, NothingJumpsAlongAPath) {
     double volume = 0, force = 0, torque = 0;
     Penetration before;
     for (int i = 0; i <= steps; ++i) {
-      const double way = 0.8 + 3.0 * i / steps;
-      for (int k = 0; k < 3; ++k) b.pose.t[k] = way * direction[k];
+      const double distance = 0.8 + 3.0 * i / steps;
+      for (int k = 0; k < 3; ++k) b.pose.t[k] = distance * direction[k];
       const Penetration now = ask(a, b, budget);
       if (i > 0) {
         volume = std::max(volume, std::abs(now.volume - before.volume));
@@ -269,7 +269,7 @@ TEST_F(QueryDetails, NothingJumpsAlongAPath) {
   }
 }
 
-// What the coarsest level does not see is not lost.
+// An overlap that the coarsest level misses is not lost.
 TEST(QueryDetailsAlone, WithoutACoarseEstimateTheFinestAnswers) {
   // The finest reaches out to x = 1, the coarser level stops far short of it.
   AssetArrays arrays;

@@ -112,7 +112,7 @@ TEST(Response, StiffnessRestsWhereItWasAskedTo) {
 }
 
 // Friction alone: at every step the work that it gives and what its springs hold is no more than
-// what they held before, whatever the way, the limit, the area and the normal do.
+// what they held before, whatever the path, the limit, the area and the normal do.
 TEST(Response, FrictionNeverGivesMoreThanItHolds) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -156,8 +156,8 @@ TEST(Response, FrictionNeverGivesMoreThanItHolds) {
   }
 }
 
-/// Where B is on a closed way through a contact, s in [0, 1).
-struct Way {
+/// B's pose on a closed path through a contact, s in [0, 1).
+struct Path {
   Vector3d centre, amplitude;
   Vector3d turn;  ///< [rad]
   Pose at(double s) const {
@@ -173,13 +173,14 @@ struct Way {
 };
 
 struct Cycle {
-  double work = 0;  ///< [force·u] given to the bodies on the way round
+  double work = 0;  ///< [force·u] given to the bodies over one cycle
   double most = 0;  ///< [force·u] held by the springs where they hold most
 };
 
-/// The work of the law round `way`, by the trapezoidal rule over `steps` steps of 1/steps s.
+/// The work of the law along the closed path, by the trapezoidal rule over `steps` steps of 1/steps
+/// s.
 template <class Placed>
-Cycle go_round(const ContactLaw& law, const Placed& a, const AssetView& tree, const Way& way,
+Cycle go_round(const ContactLaw& law, const Placed& a, const AssetView& tree, const Path& path,
                int steps, std::size_t patch_count, ContactMemory& memory) {
   Workspace workspace;
   std::vector<ContactPatch> patches(patch_count);
@@ -189,7 +190,7 @@ Cycle go_round(const ContactLaw& law, const Placed& a, const AssetView& tree, co
   const double step = 1.0 / steps;
   const auto motion_at = [&](double s) {
     constexpr double kHalf = 1e-6;
-    const Pose before = way.at(s - kHalf), after = way.at(s + kHalf);
+    const Pose before = path.at(s - kHalf), after = path.at(s + kHalf);
     const Quaterniond q0(before.q[0], before.q[1], before.q[2], before.q[3]);
     const Quaterniond q1(after.q[0], after.q[1], after.q[2], after.q[3]);
     const Eigen::AngleAxisd turn(q1 * q0.conjugate());
@@ -198,7 +199,7 @@ Cycle go_round(const ContactLaw& law, const Placed& a, const AssetView& tree, co
   };
   for (int i = 0; i <= steps; ++i) {
     const double s = i * step;
-    const Pose pose = way.at(s);
+    const Pose pose = path.at(s);
     const ContactPatches found = contact_patches(a, {tree, pose}, {}, workspace, patches);
     const Motion motion = motion_at(s);
     const ContactForce now = contact_force(law, std::span(patches).first(found.count), motion,
@@ -216,7 +217,7 @@ Cycle go_round(const ContactLaw& law, const Placed& a, const AssetView& tree, co
 
 struct Loop {
   const char* name;
-  Way way;
+  Path path;
 };
 
 const std::array<Loop, 4> kOnPlane = {
@@ -239,7 +240,7 @@ TEST(Response, APotentialKeepsEnergyRoundEveryLoop) {
   law.area = 0.3;
   const auto expect_none = [&](const auto& a, const AssetView& tree, const Loop& loop) {
     ContactMemory memory;
-    const Cycle cycle = go_round(law, a, tree, loop.way, 4000, 1, memory);
+    const Cycle cycle = go_round(law, a, tree, loop.path, 4000, 1, memory);
     EXPECT_GT(cycle.most, 1e-2) << loop.name;
     EXPECT_LT(std::abs(cycle.work), 2e-4 * cycle.most) << loop.name;
   };
@@ -260,8 +261,8 @@ TEST(Response, PatchesGiveNextToNothingRoundALoop) {
         law.stiffness = 1000;
         law.damping = damping;
         ContactMemory memory;
-        go_round(law, a, tree, loop.way, 400, patches, memory);
-        const Cycle cycle = go_round(law, a, tree, loop.way, 2000, patches, memory);
+        go_round(law, a, tree, loop.path, 400, patches, memory);
+        const Cycle cycle = go_round(law, a, tree, loop.path, 2000, patches, memory);
         EXPECT_LT(cycle.work, (damping > 0 ? 0 : 0.01) * cycle.most)
             << loop.name << ", " << patches << " patches, damping " << damping;
       }

@@ -157,7 +157,7 @@ TEST(SceneRecord, NoBytesDoMoreThanRaise) {
     if (changed != record) {
       EXPECT_NE(fault_of(changed, assets), "");
     }
-    // With a hash that agrees, as someone who means it would write.
+    // With a matching hash, as an attacker would write.
     const std::uint64_t hash = XXH3_64bits(changed.data() + kHeader, changed.size() - kHeader);
     std::memcpy(changed.data() + kHash, &hash, sizeof hash);
     try {
@@ -206,7 +206,7 @@ TEST(SceneEvents, AreConsistentOverTenThousandSteps) {
       ASSERT_EQ(met.count({pair.a, pair.b}), 1u) << step;
       ASSERT_EQ(now.count({pair.a, pair.b}), 0u) << step;
     }
-    // What met before stays or ended.
+    // Pairs that met before stay or end.
     std::size_t stayed = 0;
     for (const auto& pair : now) stayed += met.count(pair);
     ASSERT_EQ(met.size(), stayed + found.ended.size()) << step;

@@ -21,7 +21,7 @@
 #include "support/surface_queries.h"
 #include "support/test_meshes.h"
 
-// Scenes against all pairs, asked one by one.
+// Compares scenes with single queries of all pairs.
 
 namespace ist {
 namespace {
@@ -67,7 +67,7 @@ std::uint64_t bits_of(const Answer& answer, std::span<const ContactPatch> patche
   for (const ContactPatch& patch : patches) bits.add(patch);
   return bits.value();
 }
-/// Of two bodies that have no answer a scene tells where their boxes meet, and else nothing.
+/// For two bodies without an answer a scene reports only that their boxes meet.
 bool is_answered(const Answer& pair) {
   return pair.pair.overlapping == YesNo::yes || pair.impact.kind != ImpactKind::no_impact ||
          pair.impact.status == QueryStatus::budget_exhausted ||
@@ -170,7 +170,7 @@ class Pile {
   std::mt19937 random_;
 };
 
-/// What a scene holds, and what it should find.
+/// The content of a scene, and the expected pairs.
 class AllPairs {
  public:
   std::map<std::uint32_t, SceneBody> bodies;
@@ -259,7 +259,7 @@ TEST(Scene, FindsWhatAllPairsHave) {
   for (unsigned seed = 1; seed <= scenes; ++seed) {
     Pile pile(seed);
     Scene scene({.max_bodies = 60, .workers = 1});
-    // The same bodies, added the other way round, by several threads.
+    // The same bodies, added in reverse order, by several threads.
     Scene other({.max_bodies = 60, .workers = 3});
     set_rules(scene);
     set_rules(other);
@@ -358,7 +358,7 @@ TEST(Scene, BoxesOfAllSizesMeetWhereTheirNumbersSay) {
     std::map<std::uint32_t, SceneBody> bodies;
     const auto body = [&](std::uint32_t number) {
       SceneBody out = block_at(number, 0, pile.below(3) != 0);
-      // A floor, and what is 1e4 times as small; in a corner, or on a lattice.
+      // A floor, and bodies 1e4 times as small; in a corner, or on a lattice.
       const double size = number == 0 ? 10 : std::exp2(pile.uniform(-10, seed % 2 == 0 ? 0 : -3));
       out.solid = PlacedSolid(block().view(), pile.pose(), size);
       return out;
@@ -454,7 +454,7 @@ TEST(Scene, MistakesAreTold) {
   EXPECT_THROW(scene.set_rule(0, 0, {.penetration = {.measure = static_cast<Measure>(3)}}), Error);
   EXPECT_FALSE(scene.set_pose(7, {}));
   EXPECT_EQ(scene.size(), 2u);
-  // What cannot be asked is no miss.
+  // An invalid query is not a miss.
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Ray& ray : {Ray{.origin = {0, nan, 0}}, Ray{.direction = {0, 0, 0}},
                          Ray{.max_distance = 0}, Ray{.max_distance = nan}}) {

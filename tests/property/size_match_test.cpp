@@ -18,7 +18,7 @@ Asset cube(bool with_mesh) {
   return bake(close_mesh(testing::cube_mesh(), "cube"), settings);
 }
 
-/// What is said of a pair is how the pair is asked.
+/// The reported match is the method that queries use.
 TEST(SizeMatch, TellsWhatIsAskedOfAPair) {
   Workspace workspace;
   const Asset bare = cube(false), whole = cube(true);

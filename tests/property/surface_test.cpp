@@ -67,7 +67,7 @@ double nearest(const std::vector<exact::FlatTriangle>& triangles, const Vector3d
   return least;
 }
 
-/// How often a surface goes around a point, by solid angles.
+/// The winding number of a surface around a point, by solid angles.
 double winding(const std::vector<exact::FlatTriangle>& triangles, const Vector3d& x) {
   double sum = 0;
   for (const exact::FlatTriangle& t : triangles) {
@@ -79,7 +79,7 @@ double winding(const std::vector<exact::FlatTriangle>& triangles, const Vector3d
   return sum / (4 * std::numbers::pi);
 }
 
-/// Where a ray meets the triangles first, edges aside.
+/// The first hit of a ray with the triangles, except near edges.
 double first(const std::vector<exact::FlatTriangle>& triangles, const Ray& ray) {
   double least = kInfinity;
   const Vector3d d = ray.direction.normalized();
@@ -274,7 +274,7 @@ TEST(Surface, WhatIsNotUsableOrHeldIsNotAnswered) {
   EXPECT_NEAR(closest_point(good, {1e30, 0, 0}).distance, 1e30, 1e20);
 }
 
-// Of shapes: along the ray to the hit all is outside, or inside; distances grow by the gradient.
+// For shapes: the ray up to the hit is all outside, or all inside; distances grow by the gradient.
 TEST(Surface, ShapesAnswerByTheirDistances) {
   std::mt19937_64 random(5);
   int hits = 0;
@@ -423,7 +423,7 @@ TEST(Surface, SeparationOfSmallMeshesIsTheLeast) {
         take_nearest(x, y, {}, {}, least);
         cross = cross || exact::cross_exactly(x.corner, y.corner);
       }
-    // Ties of what touches decide one way or the other.
+    // Ties of touching surfaces may be decided as inside or outside.
     const bool overlap = testing::exactly(a, b, workspace).volume > 1e-14 ||
                          (cross && std::sqrt(least.squared) > 1e-12);
     const double want = overlap ? 0 : std::sqrt(least.squared);
@@ -459,7 +459,7 @@ TEST(Surface, SeparationOfSmallMeshesIsTheLeast) {
   EXPECT_GT(touch, 25);
 }
 
-/// What is kept of a pair changes no bit, whatever way the motion goes.
+/// Kept data of a pair changes no bit, whatever the direction of the motion.
 TEST(Surface, SeparationOfAMotionsStepsIsThatFromScratch) {
   std::mt19937_64 random(55);
   Workspace kept, scratch;
@@ -519,7 +519,7 @@ TEST(Surface, SeparationNeedsNoCapacity) {
   }
 }
 
-/// What is held as a whole is at no distance; what lies in a cavity is.
+/// A solid wholly inside another has distance 0; one in a cavity does not.
 TEST(Surface, SeparationOfWhatIsInside) {
   Workspace workspace;
   const Body box(testing::box_mesh({-1, -1, -1}, {1, 1, 1}));

@@ -176,7 +176,7 @@ class Certified : public ::testing::Test {
     EXPECT_LE(gap, found.distance_max * (1 + 1e-9));
     if (found.kind == ImpactKind::impact) {
       EXPECT_LE(gap, settings.tolerance);
-      // Of a pair that comes to the tolerance; another may be nearer by a part of it.
+      // The distance of a pair that reaches the tolerance; another may be nearer by a part of it.
       const double between = (found.point_b - found.point_a).norm();
       EXPECT_GE(between, gap - 1e-9);
       EXPECT_LE(between, found.distance_max + 1e-9);
@@ -246,25 +246,25 @@ TEST(TimeOfImpact, NoBulletPasses) {
   for (double speed = 1e-3; speed < 2e9; speed *= 10) {
     for (int i = 0; i < 20; ++i) {
       // From one side to the other in one step, or as far as the step leads.
-      Vector3d way;
+      Vector3d direction;
       do {
-        way = random_vector([&] { return normal(random); }).normalized();
-      } while (std::abs(way.z()) < 0.05);
+        direction = random_vector([&] { return normal(random); }).normalized();
+      } while (std::abs(direction.z()) < 0.05);
       const Vector3d hit(20 * (uniform(random) - 0.5), 20 * (uniform(random) - 0.5),
-                         way.z() > 0 ? 0.0 : 1.0);
+                         direction.z() > 0 ? 0.0 : 1.0);
       const double share = 0.1 + 0.8 * uniform(random);
       const Pose spun = random_pose(random, 0);
       Pose start = spun;
-      const Vector3d from = hit - (share * speed + 0.005 / std::abs(way.z())) * way;
+      const Vector3d from = hit - (share * speed + 0.005 / std::abs(direction.z())) * direction;
       for (int k = 0; k < 3; ++k) start.t[k] = from[k];
-      Motion motion = straight(speed * way);
+      Motion motion = straight(speed * direction);
       motion.angular_velocity = random_vector([&] { return 3 * normal(random); });
       const TimeOfImpact found =
           time_of_impact(PlacedAsset{wall().view(), {}, 1}, {ball().view(), start, 0.005},
                          {{}, motion}, {}, workspace());
       EXPECT_EQ(found.kind, ImpactKind::impact) << speed << " " << i;
       const Vector3d centre = from + motion.velocity * found.time;
-      const double height = way.z() > 0 ? -centre.z() : centre.z() - 1;
+      const double height = direction.z() > 0 ? -centre.z() : centre.z() - 1;
       const double rounding = 1e-15 * speed;
       EXPECT_GE(height, 0.00499 * 0.95 - rounding) << speed;
       EXPECT_LE(height, 0.005 + 1e-5 + rounding) << speed;
@@ -280,18 +280,19 @@ TEST(TimeOfImpact, NoBulletPassesAThinWall) {
   for (const double scale : {1e-6, 1e-3, 0.1, 1.0}) {
     for (const double speed : {1.0, 1e3, 1e6}) {
       for (const double size : {1e-6, 1.0, 1e6}) {
-        Vector3d way = random_vector([&] { return normal(random); });
-        way.z() = 1 + std::abs(way.z());
-        way.normalize();
+        Vector3d direction = random_vector([&] { return normal(random); });
+        direction.z() = 1 + std::abs(direction.z());
+        direction.normalize();
         Pose start = random_pose(random, 0);
-        const Vector3d from = size * (Vector3d(0.1, 0.2, 0) - (0.4 * speed + 3 * scale) * way);
+        const Vector3d from =
+            size * (Vector3d(0.1, 0.2, 0) - (0.4 * speed + 3 * scale) * direction);
         for (int k = 0; k < 3; ++k) start.t[k] = from[k];
-        Motion motion = straight(size * (speed + 6 * scale) * way);
+        Motion motion = straight(size * (speed + 6 * scale) * direction);
         motion.angular_velocity = random_vector([&] { return 10 * normal(random); });
         const TimeOfImpact found =
             time_of_impact(PlacedAsset{sheet.view(), {}, size},
                            {torus().view(), start, size * scale}, {{}, motion}, {}, workspace());
-        // What the rounding of so long a way hides is said, never passed over.
+        // An impact hidden by the rounding of so long a path is reported, never skipped.
         const bool told = 1e-15 * speed < 1e-4 * scale;
         EXPECT_EQ(found.kind, told ? ImpactKind::impact : ImpactKind::unresolved)
             << scale << " " << speed << " " << size;

@@ -1,5 +1,5 @@
 // Distances of solids of unlike sizes, far apart for their size, that touch, or that fit into each
-// other: none is dear.
+// other: none is expensive.
 
 #include <gtest/gtest.h>
 #include <ist/query.h>
@@ -42,9 +42,9 @@ TEST(UnlikeSeparation, IsNoDearer) {
             pose_a = testing::random_pose(random, 0);
             pose_b = testing::random_pose(random, 0);
           }
-          const testing::Vector3d way =
+          const testing::Vector3d direction =
               i % 3 == 0 ? testing::Vector3d::UnitZ() : testing::random_direction(random);
-          for (int k = 0; k < 3; ++k) pose_b.t[k] = far * (1 + scale) * way[k];
+          for (int k = 0; k < 3; ++k) pose_b.t[k] = far * (1 + scale) * direction[k];
           const PlacedAsset placed_a{a.view(), pose_a, 1}, placed_b{b.view(), pose_b, scale};
           for (const bool swapped : {false, true}) {
             const Separation found = swapped ? separation(placed_b, placed_a, {}, workspace)

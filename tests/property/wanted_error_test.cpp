@@ -191,7 +191,7 @@ TEST_F(WantedErrors, NearlyAllPosesErrByLess) {
   }
 }
 
-// The other way round of two solids, up to what the sums differ by.
+// Two solids in reverse order, up to the difference of the sums.
 TEST_F(WantedErrors, FewTrianglesAndSurfacesAloneAreExact) {
   for (int i = 0; i < 20; ++i) {
     const PlacedAsset a{cube().view(), random_pose(random_, 0), 1};
@@ -360,7 +360,7 @@ TEST_F(WantedErrors, PatchesSumToTheBlend) {
   EXPECT_GT(exact_ones, 20);
 }
 
-/// The same solid at other spheres: copies that no content hash tells.
+/// The same solid at other spheres: copies that no content hash identifies.
 const Asset& other_ring() {
   static const Asset asset = baked(torus_mesh(0.35, 0.14, 60, 30), "ring", 1000);
   return asset;

@@ -116,7 +116,7 @@ TEST_F(WorkspaceCapacity, IsSmallForSmallTreesAndKnowsPosesNot) {
   EXPECT_LT(workspace_capacity(other, other), 1u << 18);
   EXPECT_EQ(workspace_capacity({large.view(), far, 2}, {small.view(), {}, 1}),
             workspace_capacity({small.view(), far, 1}, {large.view(), far, 2}));
-  // What the documentation of Workspace says of its bytes.
+  // The number of bytes in the documentation of Workspace.
   for (const std::size_t capacity : {4096, 1 << 16, 1 << 20})
     EXPECT_NEAR(static_cast<double>(bytes_of(capacity)), 9e6 + 173 * static_cast<double>(capacity),
                 0.5e6);

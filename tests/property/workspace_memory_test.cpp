@@ -16,7 +16,7 @@
 namespace ist {
 namespace {
 
-/// What a workspace's memory holds before it is used.
+/// The content of a workspace's memory before its first use.
 enum class Held { zeros, ones, numbers, noise };
 
 void fill(Held held, std::byte* memory, std::size_t bytes) {

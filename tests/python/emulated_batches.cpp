@@ -1,4 +1,4 @@
-// What ist::ist asks of a GPU's batches, on a device that is host memory.
+// The batch functions of a GPU that ist::ist uses, on a device that is host memory.
 
 #include <ist/gpu.h>
 #include <ist/gpu_query.h>

@@ -2,7 +2,7 @@
 
 #include <functional>
 
-// A device that is host memory, for tests of ist.gpu: what the module asks of CUDA.
+// A device that is host memory, for tests of ist.gpu: the CUDA functions that the module uses.
 //
 // Work of a stream is done as late as can be, when somebody waits for it, and then no more than is
 // needed. So what is freed, spoiled or read too early is seen.

@@ -501,7 +501,7 @@ def test_a_captured_stream_needs_memory_for_answers(solids, arguments):
     many = {n: np.concatenate([x] * 120) for n, x in arguments.items()}
     many["poses"][:, 4:] = 1e6
     ask(assets, many, out=dict(volume=kept(np.ones(4800))))
-    # The graph goes on in its own room, which is not freed: who waits for its stream does its work.
+    # The graph continues in its own memory, which is not freed: waiting for its stream runs its work.
     poses = arguments["poses"].copy()
     waits = Interface(shape=(40, 7), data=(poses.ctypes.data, False), stream=captured)
     batch(assets, a=0, b=1, poses=waits).volume.numpy()

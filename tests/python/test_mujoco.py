@@ -526,7 +526,7 @@ def test_a_binary_model_travels_without_its_assets(folder, tmp_path):
         print(*data.qpos)
     """], check=True, capture_output=True, text=True, cwd=tmp_path)
     qpos = said.stdout.splitlines()[-1].split()
-    # That copy is of floats: in a thread of 2 mm the nut goes on as it did to a few of their digits.
+    # The copy is in floats: in a thread of 2 mm the nut moves as before, to a few of their digits.
     assert np.array(qpos, float) == pytest.approx(there, abs=1e-5)
     assert "MuJoCo's copy of the mesh" in said.stdout + said.stderr
 

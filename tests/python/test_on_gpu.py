@@ -534,7 +534,7 @@ def test_graphs_capture_batches(assets, pairs):
     with pytest.raises(ValueError, match="out: None; wanted arrays for the answers, because the stream"):
         with torch.cuda.graph(refused, stream=side):
             ask(assets, **arguments, stream=side)
-    # What was captured goes on after a larger batch.
+    # A captured graph still works after a larger batch.
     host(ask(assets, **{n: x.repeat(2000, *[1] * (x.ndim - 1))
                                         for n, x in arguments.items()}))
     graph.replay()

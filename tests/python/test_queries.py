@@ -501,7 +501,7 @@ def test_what_is_not_held_is_no_zero(thread, cube, random_poses):
             assert np.isnan(getattr(found, name)).all(), name
         assert len(ist.penetration(a, b, poses[:0], measure=measure).volume) == 0
     assert np.isnan(ist.separation(bolt, nut, poses, inner_spheres=True).distance).all()
-    # Of one pose nobody looks at the status.
+    # The status of a single pose is not returned.
     pose = poses[0]
     for text, ask in (
             ("b: has no mesh, which measure='exact' needs",
@@ -737,7 +737,7 @@ def test_a_scene_tells_impacts_as_time_of_impact_does(gear, knot):
     end = ist.time_of_impact(gear, knot, poses[1], poses[1], poses_a=poses[0], duration=2.0)
     assert end.kind == ist.ImpactKind.no_impact
     assert step.impact.kind[0] == ist.ImpactKind.impact and 0.5 < step.impact.time[0] < 2
-    # Where the bodies are then, they are as near as it says.
+    # At that time the bodies are as near as reported.
     moved = poses[1].copy()
     angle = velocities[1, 3:] * step.impact.time[0]
     half = np.linalg.norm(angle) / 2

@@ -29,7 +29,7 @@ namespace {
 using namespace ist;
 namespace fs = std::filesystem;
 
-/// As it is, or repaired where it is open; nothing where it is refused.
+/// The mesh as it is, or repaired if it is open; empty if it is refused.
 std::optional<ClosedMesh> closed_mesh(const fs::path& path) {
   for (const OpenMeshPolicy policy : {OpenMeshPolicy::refuse, OpenMeshPolicy::repair}) {
     try {
@@ -42,7 +42,7 @@ std::optional<ClosedMesh> closed_mesh(const fs::path& path) {
   return std::nullopt;
 }
 
-/// What is wrong with an asset; empty: nothing.
+/// The fault of an asset; empty if there is none.
 std::string wrong(const Asset& asset, const ClosedMesh& mesh,
                   const std::optional<testing::MeshRow>& truth) {
   std::string text;

@@ -33,7 +33,7 @@ using namespace ist;
 using Point = Eigen::Vector3d;
 
 constexpr std::size_t kChunk = 250;  // poses drawn from one stream of random numbers
-/// What may not happen, and what did.
+/// Forbidden events, and their counts.
 struct Tally {
   std::uint64_t poses = 0, crossing = 0, contained = 0, apart = 0, pairs = 0;
   std::uint64_t unfinished = 0;    ///< status other than ok
@@ -159,9 +159,9 @@ class Chunk {
       const double size = std::min(testing::size_of(m.at_a), testing::size_of(m.at_b));
       if (i < all.size() || one_in(30)) {
         const double step = std::pow(10, one_in(8) ? uniform(-1.5, 0) : uniform(-6, -1.5));
-        const auto way = [&] { return Point(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)); };
-        m.velocity = step * size * way();
-        m.spin = one_in(3) ? Point(Point::Zero()) : Point(step * way());
+        const auto draw = [&] { return Point(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)); };
+        m.velocity = step * size * draw();
+        m.spin = one_in(3) ? Point(Point::Zero()) : Point(step * draw());
         m.carried = one_in(4);
       }
       if (one_in(60)) one_in(2) ? align(*m.a, *m.b, m.at_a, m.at_b) : scatter(m.at_a, m.at_b);
@@ -204,10 +204,10 @@ class Chunk {
     b.scale = std::pow(10, one_in(4) ? uniform(-4, 1) : uniform(-0.3, 0.3)) * testing::size_of(a) /
               testing::size_of(b);
     const double reach = (testing::size_of(a) + testing::size_of(b)) / 2;
-    const Point way(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+    const Point offset(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
     set(a.pose, testing::random_turn(random_), {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)});
     set(b.pose, testing::random_turn(random_),
-        Point(a.pose.t[0], a.pose.t[1], a.pose.t[2]) + 0.6 * reach * way);
+        Point(a.pose.t[0], a.pose.t[1], a.pose.t[2]) + 0.6 * reach * offset);
   }
 
   /// Faces, edges and corners in common, or next to that: by turns of a cube, or by parts of a

@@ -32,7 +32,7 @@ using namespace ist;
 constexpr std::size_t kChunk = 1000;  // queries drawn from one stream of random numbers
 constexpr std::size_t kRounds = 10;
 
-/// What may not happen, and what did; summed over threads.
+/// Forbidden events, and their counts; summed over threads.
 struct Tally {
   std::uint64_t not_numbers = 0;    ///< answers with NaN, or with Inf where that means nothing
   std::uint64_t disordered = 0;     ///< a value outside its own bounds, or a negative one
@@ -78,7 +78,7 @@ std::vector<Asset> make_assets() {
   return assets;
 }
 
-/// One thread's scratch. The small workspace stops queries half way.
+/// One thread's scratch. The small workspace stops queries before they end.
 struct Worker {
   Workspace large{1u << 12}, small{48};
   Tally tally;
@@ -148,9 +148,9 @@ class Chunk {
       }
       case 2: {
         ContactPatch patches[8];
-        const std::span<ContactPatch> room(patches, 1 + random_() % 8);
-        const ContactPatches answer = contact_patches(a, b, settings, workspace, room);
-        look_at(answer, room);
+        const std::span<ContactPatch> found(patches, 1 + random_() % 8);
+        const ContactPatches answer = contact_patches(a, b, settings, workspace, found);
+        look_at(answer, found);
         bits_.add(answer.penetration), bits_.add(std::uint64_t{answer.count});
         break;
       }

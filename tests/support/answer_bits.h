@@ -10,7 +10,7 @@
 
 namespace ist::testing {
 
-/// Hash of the bits of answers: every member by itself, since padding holds anything.
+/// Hash of the bits of answers: member by member, since padding is arbitrary.
 class AnswerBits {
  public:
   AnswerBits() { XXH3_64bits_reset(&state_); }

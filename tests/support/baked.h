@@ -14,7 +14,7 @@ inline PackingSettings of_size(std::size_t spheres, unsigned threads = 0) {
   return settings;
 }
 
-/// `keep_mesh`: whether the asset holds its mesh.
+/// `keep_mesh`: the asset contains its mesh.
 inline Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres,
                    bool keep_mesh = true) {
   PackingSettings settings = of_size(spheres);

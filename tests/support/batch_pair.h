@@ -50,7 +50,7 @@ struct BatchColumns {
   std::vector<double> area, normal;
   std::vector<std::uint8_t> touching;
 
-  /// Room for answers of n pairs.
+  /// Memory for answers of n pairs.
   static BatchColumns unwritten(std::size_t n) {
     constexpr double kUnwritten = -7;
     return {std::vector<double>(n, kUnwritten),

@@ -30,8 +30,8 @@ inline ConvexSolid faces_of(const OrientedBox& box) {
   return solid;
 }
 
-/// What of the solid lies where n · x ≤ offset: every face is cut, the cut is closed by a fan of
-/// its own edges about the cut's first corner.
+/// The part of the solid with n · x ≤ offset: every face is cut, and a fan about the cut's first
+/// corner closes the cut.
 inline ConvexSolid clipped(const ConvexSolid& solid, const Eigen::Vector3d& n, double offset) {
   ConvexSolid kept;
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> rim;  // edges along the cut

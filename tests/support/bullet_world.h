@@ -14,7 +14,7 @@
 #include "support/baked.h"
 #include "support/test_meshes.h"
 
-// A world of Bullet's with assets in it, and what it warns of.
+// A Bullet world with assets in it, and its warnings.
 
 namespace ist::testing {
 

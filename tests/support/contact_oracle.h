@@ -3,7 +3,7 @@
 // Contact or no contact, against FCL and Bullet on the same meshes and poses. A mesh library sees
 // surfaces; whether one solid holds the other comes from the oracle or from solid angles here.
 //
-// What must hold, without any band:
+// The required relations, without tolerance:
 //   inner overlap > 0      ⇒ the solids meet                       (inner spheres are inside)
 //   the solids meet        ⇒ distance_min = 0                      (cover balls hold the solids)
 //   they are d > 0 apart   ⇒ distance_min ≤ d ≤ distance_max
@@ -80,7 +80,7 @@ struct Body {
   double protrusion = 0;    ///< [u] p: no matched sphere sticks out further
 };
 
-/// A mesh, baked once, at every scale it is asked for.
+/// A mesh, baked once, at every requested scale.
 class Model {
  public:
   Model(const std::string& path, std::size_t spheres)
@@ -103,7 +103,7 @@ class Model {
   std::map<double, std::unique_ptr<Body>> bodies_;
 };
 
-/// Two placed solids and what is known of them. A rests at the identity.
+/// Two placed solids and their known properties. A rests at the identity.
 struct ContactCase {
   std::string name;
   Body* a = nullptr;
@@ -111,15 +111,15 @@ struct ContactCase {
   Pose pose_b;
   bool held = false;            ///< one solid holds the other: no surface crosses
   double surface_distance = 0;  ///< [u]
-  /// Unit: the way B leaves A, against the exact gradient of the volume (FCL's mean normal where
-  /// the crossing is too small to integrate over); zero where they do not cross.
+  /// Unit: the direction in which B leaves A, against the exact gradient of the volume (FCL's mean
+  /// normal where the crossing is too small to integrate over); zero where they do not cross.
   Eigen::Vector3d exit = Eigen::Vector3d::Zero();
 
   bool cross() const { return surface_distance == 0; }
   bool meet() const { return cross() || held; }
 };
 
-/// What the three libraries said of a case.
+/// The verdict of the three libraries on a case.
 struct ContactVerdict {
   std::vector<std::string> wrong;  ///< statements above that are false: none may be
   bool matched = false;            ///< overlap > 0 in that measure
@@ -258,7 +258,7 @@ inline double winding_number(const TriangleMesh& mesh, const Eigen::Vector3d& x)
   return sum / (2 * std::numbers::pi);
 }
 
-/// For surfaces that do not cross and meshes of one component: does either solid hold the other?
+/// For surfaces that do not cross and meshes of one component: does either solid contain the other?
 inline bool one_holds_the_other(const ContactCase& c) {
   const Eigen::Isometry3d b_to_a = to_isometry(c.pose_b);
   const Eigen::Vector3d of_b = b_to_a * (c.b->scale * c.b->closed->mesh.vertices.front());

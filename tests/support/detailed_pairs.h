@@ -10,7 +10,7 @@
 
 namespace ist::testing {
 
-/// Of one to four levels; the last has the bytes of the first.
+/// Assets with one to four levels; the last has the bytes of the first.
 inline const std::vector<Asset>& detailed_assets() {
   static const std::vector<Asset> made = [] {
     std::vector<Asset> out;
@@ -57,13 +57,13 @@ inline std::vector<BatchPair> copies_in_place(std::size_t count, unsigned seed) 
     pair.b = pair.a == 0 && k % 8 == 0 ? 4 : pair.a;
     pair.pose_a = pair.pose_b = random.pose(0.5);
     pair.scale_a = pair.scale_b = 0.9;
-    const double way = k < 8 ? 0 : 0.06 * random.uniform(0, 1);
-    for (double& t : pair.pose_b.t) t += way * random.uniform(-1, 1);
+    const double change = k < 8 ? 0 : 0.06 * random.uniform(0, 1);
+    for (double& t : pair.pose_b.t) t += change * random.uniform(-1, 1);
     Eigen::Quaterniond q(pair.pose_b.q[0], pair.pose_b.q[1], pair.pose_b.q[2], pair.pose_b.q[3]);
-    q = Eigen::AngleAxisd(way, Eigen::Vector3d::UnitX()) * q;
+    q = Eigen::AngleAxisd(change, Eigen::Vector3d::UnitX()) * q;
     const double turned[4] = {q.w(), q.x(), q.y(), q.z()};
     std::copy(turned, turned + 4, pair.pose_b.q);
-    if (k % 3 == 0) pair.scale_b *= 1 + 0.5 * way;
+    if (k % 3 == 0) pair.scale_b *= 1 + 0.5 * change;
     out.push_back(pair);
   }
   return out;

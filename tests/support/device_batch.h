@@ -55,7 +55,7 @@ class Stream {
   cudaStream_t stream_ = nullptr;
 };
 
-/// Pairs and room for their answers on the device.
+/// Pairs and memory for their answers on the device.
 class DeviceBatch {
  public:
   explicit DeviceBatch(const std::vector<BatchPair>& pairs)

@@ -11,7 +11,7 @@
 
 namespace ist::testing {
 
-/// Room for the patches of so many pairs on the device.
+/// Device memory for the patches of pairs.
 class DevicePatches {
  public:
   DevicePatches(std::size_t pairs, std::uint32_t most)

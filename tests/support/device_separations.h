@@ -11,7 +11,7 @@
 
 namespace ist::testing {
 
-/// Room for separations on the device.
+/// Device memory for separations.
 class DeviceSeparations {
  public:
   explicit DeviceSeparations(std::size_t size)

@@ -86,7 +86,7 @@ inline Differences compare_exactly(const std::vector<Asset>& assets,
     EXPECT_EQ(gpu.touching, cpu.touching) << i;
     worst.touching += cpu.touching ? 1 : 0;
     worst.flush += cpu.contact_area > 0 ? 1 : 0;
-    // What is a rounding of nothing has no digits.
+    // An area that is only rounding has no correct digits.
     const double least = std::max(cpu.contact_area, 1e-9 * size2);
     worst.area = std::max(worst.area, std::abs(gpu.contact_area - cpu.contact_area) / least);
     if (cpu.contact_area > 1e-6 * size2)
@@ -126,7 +126,7 @@ struct MatedBatch {
       const Mate mate = mates.next(12);
       for (const Extrusion* of : {&mate.a, &mate.b}) assets.push_back(surface(of->mesh(), "part"));
       const double off = mates.one_in(3) ? std::ldexp(1.0, -mates.whole(2, 40)) : 0;
-      const Eigen::Vector3d t = mate.t + (mates.one_in(2) ? off : -off) * mate.way;
+      const Eigen::Vector3d t = mate.t + (mates.one_in(2) ? off : -off) * mate.direction;
       const Pose still = {{1, 0, 0, 0}, {0, 0, 0}};
       const Pose placed = {{mate.q.w(), mate.q.x(), mate.q.y(), mate.q.z()}, {t.x(), t.y(), t.z()}};
       pairs.push_back({2 * k, 2 * k + 1, still, placed, 1, 1});

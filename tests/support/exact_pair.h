@@ -11,7 +11,7 @@
 #include "query/exact/exact_overlap.h"
 #include "query/scratch/workspace.h"
 
-// Exact queries as tests ask them.
+// Exact queries for tests.
 
 namespace ist::testing {
 
@@ -25,7 +25,6 @@ inline Penetration exactly(const PlacedAsset& a, const PlacedAsset& b, Workspace
   return penetration(a, b, settings, workspace);
 }
 
-/// What a query knows of its own answer.
 struct ExactCheck {
   bool complete = false;
   bool consistent = false;
@@ -53,7 +52,7 @@ class GapQuery : public ExactQuery {
   exact::Point gap() const {
     exact::Point gap = {};
     const auto add = [&](double factor, const exact::Point& p) { gap = gap + factor * p; };
-    // The way from the nearer end of a pierced edge.
+    // The vector from the nearer end of a pierced edge.
     for (std::uint32_t i = 0; i < out_.crossings; ++i)
       for (int e = 0; e < 2; ++e) {
         const CrossingEnd end = scratch_.crossings.end_of(i, e);

@@ -12,7 +12,7 @@
 #include "support/exact_batches.h"
 #include "support/patch_columns.h"
 
-// What batches of exact contact patches say beside the CPU.
+// Comparison of batches of exact contact patches with the CPU.
 
 namespace ist::testing {
 

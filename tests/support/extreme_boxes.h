@@ -17,8 +17,6 @@
 #include "support/test_meshes.h"
 #include "support/turns.h"
 
-// What the extremes measure with.
-
 namespace ist::testing {
 
 using Eigen::Vector3d;
@@ -27,7 +25,7 @@ constexpr std::size_t kExtremeSpheres = 1000;
 constexpr double kNoPromise = std::numeric_limits<double>::infinity();
 inline const Vector3d kHalfA(0.5, 0.4, 0.3), kHalfB(0.3, 0.5, 0.6);
 
-/// Largest of what it is shown; NaN stays.
+/// The largest value so far; NaN stays.
 class Worst {
  public:
   void add(double value) {
@@ -130,7 +128,7 @@ class Boxes {
       const Pose apart = pose(Eigen::Quaterniond::Identity(),
                               {kHalfA.x() + size_b_ / size_a_ * kHalfB.x() + gap, 0.1, -0.1});
       const Separation got = separation(a(), b(apart), {}, workspace);
-      // What t is rounded to moves B by that much.
+      // The rounding of t moves B by that much.
       const double rounding = 4e-16 * (centre_a_.norm() + centre_b_.norm());
       outside += got.distance_min > gap * size_a_ + rounding;
       outside += got.distance_max < gap * size_a_ - rounding;

@@ -2,7 +2,7 @@
 
 #include "support/extreme_boxes.h"
 
-// Extremes of what is baked.
+// Extreme inputs of bakes.
 
 namespace ist::testing {
 

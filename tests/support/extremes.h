@@ -5,7 +5,7 @@
 
 namespace ist::testing {
 
-/// One promise about an extreme input, and what was measured.
+/// One promise about an extreme input, and its measurement.
 struct Claim {
   std::string what;  ///< the measured quantity, with its unit
   double worst = 0;  ///< largest that was measured

@@ -8,7 +8,7 @@
 
 namespace ist::testing {
 
-/// A round of a packing on grids, and what the grids hold at its end.
+/// A round of a packing on grids, and the content of the grids at its end.
 struct GridRound {
   double seconds = 0;  ///< since the start
   std::size_t spheres = 0;

@@ -17,9 +17,9 @@ namespace ist::testing {
 /// of 32.
 class HostBatch {
  public:
-  /// Room for what is split: so many of each kind.
-  explicit HostBatch(HostSolids solids, std::uint32_t room = 1 << 16)
-      : solids_(std::move(solids)), room_(room) {
+  /// The capacity for split pairs, by kind.
+  explicit HostBatch(HostSolids solids, std::uint32_t capacity = 1 << 16)
+      : solids_(std::move(solids)), capacity_(capacity) {
     cut_for(1);
   }
 
@@ -31,18 +31,18 @@ class HostBatch {
   gpu::ExactCounters exact_counters;  ///< of the last exact one
   std::uint32_t most_alone = 0, task_weight = 0;
   bool by_size = true;
-  // Of pairs of a tree and a field.
+  // For pairs of a tree and a field.
   gpu::FieldCounters field_counters;  ///< of the last run
   std::uint32_t query_capacity = 7, part_capacity = 20,
                 word_capacity = 3000;  ///< gpu::TriangleWorkspace
-  // Of pairs of meshes: pairs of a round, chunks of triangles.
+  // For pairs of meshes: pairs of a round, chunks of triangles.
   std::uint32_t mesh_capacity = 50, mesh_chunks = 400;
   std::uint32_t most_rounds = ~0u;
   std::uint32_t rounds = 0;  ///< of the last run
-  // What exact runs keep from one to the next: see GpuKept.
+  // State that exact runs keep for the next: see GpuKept.
   std::uint32_t held = 0, fresh = 0;  ///< of the last run: pairs not searched; searched and kept
 
-  /// Of so many pairs from now on.
+  /// From now on, keeps the state of at most so many pairs.
   void keep(std::uint32_t most_pairs, std::uint32_t bytes_each);
 
   /// How pairs are cut up in a workspace for so many; for few at first.
@@ -57,7 +57,7 @@ class HostBatch {
   void sum_rounds(const gpu::FieldBatch& batch, unsigned seed);
 
   HostSolids solids_;
-  std::uint32_t room_;
+  std::uint32_t capacity_;
   std::vector<gpu::TriangleQuery> queries_;
   std::vector<gpu::MetPart> parts_;
   std::vector<std::uint32_t> words_;

@@ -28,12 +28,12 @@ std::vector<Penetration> HostBatch::run(const std::vector<BatchPair>& pairs, Mea
   const PairColumns columns(pairs);
   BatchColumns to = BatchColumns::unwritten(n);
   std::vector<std::uint32_t> list(gpu::kSizes * n), detailed(n);
-  std::vector<gpu::SplitPair> splits(room_);
-  std::vector<gpu::PairTask> tasks(room_);
-  std::vector<std::uint32_t> posted(room_);
-  std::vector<PairPlace> places(room_);
-  std::vector<gpu::LensTotals> totals(2 * std::size_t{room_});
-  std::vector<std::uint32_t> entries_a(room_), entries_b(room_);
+  std::vector<gpu::SplitPair> splits(capacity_);
+  std::vector<gpu::PairTask> tasks(capacity_);
+  std::vector<std::uint32_t> posted(capacity_);
+  std::vector<PairPlace> places(capacity_);
+  std::vector<gpu::LensTotals> totals(2 * std::size_t{capacity_});
+  std::vector<std::uint32_t> entries_a(capacity_), entries_b(capacity_);
   counters = {};
   const gpu::SolidPairs asked = solids_.asked(columns.pairs(), measure, to.answers());
   if (measure == Measure::exact) {
@@ -53,9 +53,9 @@ std::vector<Penetration> HostBatch::run(const std::vector<BatchPair>& pairs, Mea
                                   totals.data(),
                                   entries_a.data(),
                                   entries_b.data(),
-                                  room_,
-                                  room_,
-                                  room_,
+                                  capacity_,
+                                  capacity_,
+                                  capacity_,
                                   most_alone,
                                   task_weight,
                                   by_size ? static_cast<std::uint32_t>(n) : 0};
@@ -161,7 +161,7 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
     exact_counters.exactly += round.unsure;
     for (std::uint32_t k = 0; k < round.nothing; ++k)
       by_team(seed, [&](const auto& team) { gpu::touch_query(team, batch, k, *pair, *contact); });
-    if (round.searched == 0) throw std::logic_error("a round has no room for a pair");
+    if (round.searched == 0) throw std::logic_error("a round has no memory for a pair");
     first = gpu::end_of(round);
   }
   rounds = n;
@@ -252,7 +252,7 @@ void HostBatch::sum_rounds(const gpu::FieldBatch& batch, unsigned seed) {
     for (std::uint32_t k = 0; k < std::min(round.parts, part_capacity); ++k)
       by_team(seed, [&](const auto& team) { gpu::sum_part(team, batch, k, *sums); });
     for (std::uint32_t k = 0; k < round.walked; ++k) gpu::answer_query(batch, k);
-    if (round.walked == 0) throw std::logic_error("a round has no room for a pair");
+    if (round.walked == 0) throw std::logic_error("a round has no memory for a pair");
     first = gpu::end_of(batch, round);
   }
   const std::uint32_t large = field_counters.large;
@@ -283,7 +283,7 @@ std::vector<PatchedPair> HostPatches::run(const std::vector<BatchPair>& pairs, M
                   vectors,
                   vectors,
                   numbers};
-  // What teams that come before left in their room must not matter.
+  // The memory's content from earlier teams must not matter.
   std::vector<std::byte> memory_of_team(gpu::PatchWorkspace::bytes(solids_.most_bins()),
                                         std::byte{0xA5});
   gpu::PatchArrays batch = {};
@@ -336,7 +336,7 @@ void HostPatches::divide_exactly(const gpu::SolidPairs& asked, const GpuContactP
       lists[gpu::kFirstPatchPass][exact_counters.listed[gpu::kFirstPatchPass]++] = i;
   const auto memory = std::make_unique<gpu::ExactWholeMemory>();
   for (int pass = gpu::kFirstPatchPass; pass < gpu::kExactPasses; ++pass) {
-    // What was there before must not matter.
+    // The contents of fresh memory must not matter.
     std::vector<std::uint64_t> bytes(batch.bytes_of_team(pass) / 8, 0xA5A5A5A5A5A5A5A5u);
     batch.memory = reinterpret_cast<std::byte*>(bytes.data());
     const gpu::ExactWorkspace work = batch.workspace(pass, 0);
@@ -367,11 +367,11 @@ std::vector<Separation> HostSeparations::run(const std::vector<BatchPair>& pairs
                        std::vector<std::uint32_t>(n)};
   const std::vector<std::uint32_t> list(n);
   std::vector<std::uint32_t> lists[3] = {list, list, list};
-  std::vector<gpu::SplitPair> splits(room_);
-  std::vector<gpu::PairTask> tasks(room_);
-  std::vector<gpu::GapTotals> totals(2 * std::size_t{room_});
-  std::vector<std::uint32_t> entries_a(room_), entries_b(room_);
-  std::vector<double> entries_gap(room_), entries_cover(room_);
+  std::vector<gpu::SplitPair> splits(capacity_);
+  std::vector<gpu::PairTask> tasks(capacity_);
+  std::vector<gpu::GapTotals> totals(2 * std::size_t{capacity_});
+  std::vector<std::uint32_t> entries_a(capacity_), entries_b(capacity_);
+  std::vector<double> entries_gap(capacity_), entries_cover(capacity_);
   counters[0] = counters[1] = counters[2] = {};
   gpu::SeparationArrays batch = {};
   static_cast<gpu::SolidPairs&>(batch.pairs) = solids_.asked(columns.pairs(), Measure::inner, {});
@@ -379,7 +379,7 @@ std::vector<Separation> HostSeparations::run(const std::vector<BatchPair>& pairs
   for (int kind = 0; kind < 3; ++kind) batch.list[kind] = lists[kind].data();
   batch.pairs.splits = splits.data();
   batch.pairs.tasks = tasks.data();
-  batch.pairs.split_capacity = batch.pairs.task_capacity = batch.pairs.entry_capacity = room_;
+  batch.pairs.split_capacity = batch.pairs.task_capacity = batch.pairs.entry_capacity = capacity_;
   batch.answers = {to.distance.data(), to.distance_min.data(), to.distance_max.data(),
                    to.point_a.data(),  to.point_b.data(),      to.normal.data(),
                    to.status.data(),   to.visits.data(),       to.spheres.data()};
@@ -438,7 +438,7 @@ void HostSeparations::separate(const gpu::SeparationArrays& batch, int kind, uns
       gpu::separate_pair<std::decay_t<decltype(team)>, Real>(team, batch, batch.list[kind][k],
                                                              *memory);
     });
-  for (std::uint32_t k = 0; k < std::min(counters[kind].tasks, room_); ++k)
+  for (std::uint32_t k = 0; k < std::min(counters[kind].tasks, capacity_); ++k)
     by_team(seed, [&](const auto& team) {
       gpu::separate_task<std::decay_t<decltype(team)>, Real>(team, batch, k, *memory);
     });

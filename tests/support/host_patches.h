@@ -23,9 +23,9 @@ class HostPatches {
   std::vector<PatchedPair> run(const std::vector<BatchPair>& pairs, Measure measure,
                                std::uint32_t most, unsigned seed = 0);
 
-  // Of Measure::exact:
+  // For Measure::exact:
   gpu::ExactCounters exact_counters;  ///< of the last run
-  /// [bytes] of a pass's room for parts, at most.
+  /// [bytes] of a pass's memory for parts, at most.
   std::ptrdiff_t part_bytes[gpu::kExactPasses] = {0, PTRDIFF_MAX, PTRDIFF_MAX};
 
  private:

@@ -14,9 +14,9 @@ namespace ist::testing {
 /// The GPU's batch of separations on the host, as HostBatch runs penetrations.
 class HostSeparations {
  public:
-  /// Room for what is split: so many of each kind.
-  explicit HostSeparations(HostSolids solids, std::uint32_t room = 1 << 16)
-      : solids_(std::move(solids)), room_(room) {}
+  /// The capacity for split pairs, by kind.
+  explicit HostSeparations(HostSolids solids, std::uint32_t capacity = 1 << 16)
+      : solids_(std::move(solids)), capacity_(capacity) {}
 
   /// `seed`: of the order in which lanes go on; 0: a team of one.
   std::vector<Separation> run(const std::vector<BatchPair>& pairs, unsigned seed = 0,
@@ -31,7 +31,7 @@ class HostSeparations {
   void separate_meshes(gpu::SeparationArrays& batch, unsigned seed);
 
   HostSolids solids_;
-  std::uint32_t room_;
+  std::uint32_t capacity_;
 };
 
 }  // namespace ist::testing

@@ -17,7 +17,7 @@
 #include "support/random_assets.h"
 #include "support/test_meshes.h"
 
-// Bodies that fly at each other, and what is known of them without conservative advancement.
+// Bodies that fly at each other, and their known impacts without conservative advancement.
 
 namespace ist::testing {
 

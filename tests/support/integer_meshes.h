@@ -85,7 +85,7 @@ class IntegerMeshes {
     return box_mesh(low, high);
   }
 
-  /// Of an outline that runs counter-clockwise and its triangles.
+  /// `outline`: counter-clockwise; `inside`: its triangles.
   TriangleMesh prism(const std::vector<std::array<int, 2>>& outline,
                      const std::vector<std::array<std::uint32_t, 3>>& inside) {
     TriangleMesh mesh;
@@ -111,17 +111,17 @@ class IntegerMeshes {
   TriangleMesh star(bool fine) {
     TriangleMesh mesh;
     if (!fine) {
-      for (const Point& way : {Point(1, 0, 0), Point(0, 1, 0), Point(0, 0, 1), Point(-1, 0, 0),
-                               Point(0, -1, 0), Point(0, 0, -1)})
-        mesh.vertices.push_back(whole(1, 6) * way);
+      for (const Point& direction : {Point(1, 0, 0), Point(0, 1, 0), Point(0, 0, 1),
+                                     Point(-1, 0, 0), Point(0, -1, 0), Point(0, 0, -1)})
+        mesh.vertices.push_back(whole(1, 6) * direction);
       mesh.triangles = {{0, 1, 2}, {1, 3, 2}, {3, 4, 2}, {4, 0, 2},
                         {1, 0, 5}, {3, 1, 5}, {4, 3, 5}, {0, 4, 5}};
       return mesh;
     }
     std::map<std::array<int, 3>, std::uint32_t> number;
-    const auto vertex = [&](const std::array<int, 3>& way) {
-      const auto [it, fresh] = number.try_emplace(way, mesh.vertices.size());
-      if (fresh) mesh.vertices.push_back(whole(2, 5) * Point(way[0], way[1], way[2]));
+    const auto vertex = [&](const std::array<int, 3>& key) {
+      const auto [it, fresh] = number.try_emplace(key, mesh.vertices.size());
+      if (fresh) mesh.vertices.push_back(whole(2, 5) * Point(key[0], key[1], key[2]));
       return it->second;
     };
     for (int axis = 0; axis < 3; ++axis)
@@ -129,11 +129,11 @@ class IntegerMeshes {
         for (int i = -1; i < 1; ++i)
           for (int j = -1; j < 1; ++j) {
             const auto at = [&](int u, int v) {
-              std::array<int, 3> way;
-              way[static_cast<std::size_t>(axis)] = side;
-              way[static_cast<std::size_t>((axis + 1) % 3)] = u;
-              way[static_cast<std::size_t>((axis + 2) % 3)] = v;
-              return vertex(way);
+              std::array<int, 3> key;
+              key[static_cast<std::size_t>(axis)] = side;
+              key[static_cast<std::size_t>((axis + 1) % 3)] = u;
+              key[static_cast<std::size_t>((axis + 2) % 3)] = v;
+              return vertex(key);
             };
             std::uint32_t a = at(i, j), b = at(i + 1, j), c = at(i + 1, j + 1), d = at(i, j + 1);
             if (side < 0) std::swap(b, d);
@@ -148,7 +148,7 @@ class IntegerMeshes {
     return joined(box_mesh(low, high), inverted(box_mesh(point(-3, -2), point(2, 3))));
   }
 
-  /// By a matrix of integers and determinant 1.
+  /// Applies a matrix of integers with determinant 1.
   void shear(TriangleMesh& mesh) {
     const int from = whole(0, 2), to = (from + whole(1, 2)) % 3, by = whole(0, 1) ? 1 : -1;
     for (Point& v : mesh.vertices) v[to] += by * v[from];

@@ -18,7 +18,7 @@
 
 namespace ist::testing {
 
-/// What may not happen, and how often it did.
+/// Failures that may not happen, with their counts.
 struct MateTally {
   std::uint64_t mates = 0, queries = 0, touching = 0;
   std::map<std::string, std::uint64_t> wrong;
@@ -37,7 +37,7 @@ struct MateWork {
   std::string what;
 };
 
-/// Asks random mates in a few poses each, and checks what is known of the answers.
+/// Asks random mates in a few poses each, and checks known properties of the answers.
 class MateChecks {
  public:
   /// `cost` of the query that `ask` makes; by default node pairs and crossing triangles.
@@ -61,7 +61,7 @@ class MateChecks {
     step();
   }
 
-  /// Of numbers of triangles of which there are a hundred queries.
+  /// Costs for those numbers of triangles that have at least a hundred queries.
   MateWork work() const {
     MateWork out;
     for (const auto& [triangles, costs] : costs_) {
@@ -90,7 +90,7 @@ class MateChecks {
     return exact_ && (q.array() == 0 || q.array() == 0.5 || q.array() == 1).all();
   }
 
-  /// As it lies, by right angles, by multiples of 15°, or anyhow.
+  /// Turns the world not at all, by right angles, by multiples of 15°, or by any angle.
   void choose_world() {
     static const std::vector<Eigen::Quaterniond> right = right_angled_turns();
     world_ = {};
@@ -116,7 +116,7 @@ class MateChecks {
   }
 
   void look_at(double aside) {
-    const Point t = mate_.t + aside * mate_.way;
+    const Point t = mate_.t + aside * mate_.direction;
     Penetration p;
     const double cost = cost_([&] { return p = ask(t); });
     const std::size_t triangles =
@@ -130,8 +130,8 @@ class MateChecks {
     const double size = std::min(size_of(placed_a_), size_of(placed_b_));
     const double larger = std::max(size_of(placed_a_), size_of(placed_b_));
     const double faces = mate_.a.surface() + mate_.b.surface();
-    // Of the truth and of the pose after the world's turn.
-    const double room = 1e-14 * faces * larger;
+    // Covers the roundings of the truth and of the pose after the world's turn.
+    const double tolerance = 1e-14 * faces * larger;
     const auto need = [&](bool right, const char* what) {
       if (right) return;
       if (++tally_.wrong[what] <= 3) show(what, aside, p, q, check, truth);
@@ -142,17 +142,19 @@ class MateChecks {
     need(p.volume_min <= p.volume && p.volume <= p.volume_max, "values outside their bounds");
     need(p.volume_max - p.volume_min <= 1e-12 * faces * larger, "wide intervals");
     need(p.volume_max <= smaller_ * (1 + 1e-11), "more than the smaller solid");
-    need(std::abs(p.volume - truth.volume) <= room, "wrong volumes");
-    need(p.volume_min <= truth.volume + room && truth.volume - room <= p.volume_max,
+    need(std::abs(p.volume - truth.volume) <= tolerance, "wrong volumes");
+    need(p.volume_min <= truth.volume + tolerance && truth.volume - tolerance <= p.volume_max,
          "intervals that miss the volume");
-    need(std::abs(p.volume - q.volume) <= room, "volumes that change when A and B are exchanged");
-    // Where turns round the places of faces, a face along the side that is taken may lie either
-    // way.
+    need(std::abs(p.volume - q.volume) <= tolerance,
+         "volumes that change when A and B are exchanged");
+    // Rotations round the positions of faces, so that a face along the chosen side may lie on
+    // either side of it.
     if (apart_everywhere(t) && turns_exactly())
       need((p.force + q.force).norm() <= 1e-11 * faces,
            "gradients that change when A and B are exchanged");
     need(p.touching == q.touching, "touching that changes when A and B are exchanged");
-    if (truth.volume > room) need(!p.touching && p.contact_area == 0, "touching inside each other");
+    if (truth.volume > tolerance)
+      need(!p.touching && p.contact_area == 0, "touching inside each other");
     if (truth.area > 1e-9 * size * size) need(p.touching, "faces on each other that do not touch");
     if (truth.area > 0 && p.touching)
       need(std::abs(p.contact_area - truth.area) <= 1e-9 * size * size, "wrong areas of contact");
@@ -169,7 +171,7 @@ class MateChecks {
       force += patch.force;
     }
     if (p.volume > 0)
-      need(std::abs(volume - p.volume) <= room && (force - p.force).norm() <= 1e-11 * faces,
+      need(std::abs(volume - p.volume) <= tolerance && (force - p.force).norm() <= 1e-11 * faces,
            "patches that do not sum to the whole");
   }
 
@@ -184,26 +186,26 @@ class MateChecks {
       return box.center();
     };
     // B's box in its own frame.
-    const Point way = mate_.q * middle(mate_.b) + t - middle(mate_.a);
-    return way.cwiseAbs().minCoeff() > 1e-12;
+    const Point offset = mate_.q * middle(mate_.b) + t - middle(mate_.a);
+    return offset.cwiseAbs().minCoeff() > 1e-12;
   }
 
   /// One unit in the last place towards A, none and one away: the volume falls.
   void step() {
     if (!mate_.parts) return;
-    const int axis = mate_.way.x() > 0 ? 0 : 2;
+    const int axis = mate_.direction.x() > 0 ? 0 : 2;
     constexpr double kFar = std::numeric_limits<double>::infinity();
     double above = kFar;
-    for (const int way : {-1, 0, 1}) {
+    for (const int side : {-1, 0, 1}) {
       Point t = mate_.t;
-      if (way != 0) t[axis] = std::nextafter(t[axis], way * kFar);
+      if (side != 0) t[axis] = std::nextafter(t[axis], side * kFar);
       const Penetration p = ask(t);
       if (p.status != QueryStatus::ok || p.volume_min > above)
-        ++tally_.wrong["volumes that grow on the way out"];
+        ++tally_.wrong["volumes that grow with the distance"];
       above = p.volume_max;
       if (in_common(mate_.a, mate_.b_turned.moved(t)).area > 1e-9 && !p.touching &&
           ++tally_.wrong["faces a unit in the last place apart that do not touch"] <= 3)
-        show("one unit in the last place apart", way, p, p, {}, {});
+        show("one unit in the last place apart", side, p, p, {}, {});
     }
   }
   std::string name(double aside) const {

@@ -12,7 +12,7 @@
 
 #include "support/exact_batches.h"
 
-// What batches of separations of meshes say beside the CPU.
+// Comparison of batches of separations of meshes with the CPU.
 
 namespace ist::testing {
 

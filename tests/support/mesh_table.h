@@ -12,7 +12,7 @@ namespace ist::testing {
 /// A row of meshes/*/MESHES.csv by column name.
 using MeshRow = std::map<std::string, std::string>;
 
-/// Fields may be quoted and hold commas.
+/// Fields may be quoted and contain commas.
 inline std::vector<std::string> csv_fields(const std::string& line) {
   std::vector<std::string> fields(1);
   bool in_quotes = false;

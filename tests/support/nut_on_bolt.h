@@ -87,7 +87,7 @@ class FreeBody {
   Eigen::Vector3d momentum_ = Eigen::Vector3d::Zero(), spin_ = Eigen::Vector3d::Zero();
 };
 
-/// What became of a run. Energies are in parts of what gravity set free.
+/// The result of a run. Energies are in parts of what gravity set free.
 struct NutRun {
   int ticks = 0;
   double travel = 0;  ///< [mm] down

@@ -31,7 +31,7 @@ struct OracleRow {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();
 
-  /// Of the solids: 0 where they meet or one holds the other.
+  /// The solids' distance: 0 if they meet or one contains the other.
   double solid_distance() const { return volume > 0 ? 0 : surface_distance; }
 };
 

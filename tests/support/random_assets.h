@@ -14,7 +14,7 @@
 
 namespace ist::testing {
 
-/// What a made-up asset is like.
+/// Settings of a random asset.
 struct RandomAsset {
   std::size_t spheres = 500;
   double smallest = 0.2;  ///< smallest radius over largest
@@ -32,7 +32,7 @@ Eigen::Vector3d random_vector(const Draw& draw) {
 }
 
 /// An asset of random spheres in the unit ball: inner ones with covers, and matched ones that
-/// overlap each other a little, as calibrated ones do. No solid stands behind it.
+/// overlap each other a little, as calibrated ones do. It represents no solid.
 inline Asset make_random_asset(const RandomAsset& like, unsigned seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform(-1, 1);

@@ -82,7 +82,7 @@ struct Extrusion {
     return out;
   }
 
-  /// Likewise with another corner half way between two, nearer to the axis; a fan about the axis.
+  /// Likewise with another corner halfway between two, nearer to the axis; a fan about the axis.
   static Extrusion fan(std::uint32_t spikes, double radius, double inner, double low, double high) {
     Extrusion out;
     out.low = low, out.high = high;
@@ -159,7 +159,7 @@ struct Extrusion {
   }
 };
 
-/// Of two triangles: area of what they have in common.
+/// The common area of two triangles.
 inline double common_area(const std::array<Eigen::Vector2d, 3>& a,
                           const std::array<Eigen::Vector2d, 3>& b) {
   using Point = Eigen::Vector2d;
@@ -182,7 +182,7 @@ inline double common_area(const std::array<Eigen::Vector2d, 3>& a,
   return twice / 2;
 }
 
-/// What two extrusions have in common, both along z.
+/// The intersection of two extrusions along z.
 struct InCommon {
   double volume = 0;
   double area = 0;  ///< of faces on each other, where the volume is 0
@@ -224,13 +224,13 @@ inline InCommon in_common(const Extrusion& a, const Extrusion& b) {
 /// Two extrusions mated, A where it is.
 struct Mate {
   const char* kind = "";
-  Extrusion a, b;        ///< each in its own frame
-  Eigen::Quaterniond q;  ///< turns B
-  Extrusion b_turned;    ///< B after that
-  Eigen::Vector3d t;     ///< and then moves it
-  Eigen::Vector3d way;   ///< unit: off A's face, or across the axis
-  bool copy = false;     ///< B is A's like
-  bool parts = false;    ///< any way in this direction sets them apart
+  Extrusion a, b;             ///< each in its own frame
+  Eigen::Quaterniond q;       ///< turns B
+  Extrusion b_turned;         ///< B after that
+  Eigen::Vector3d t;          ///< and then moves it
+  Eigen::Vector3d direction;  ///< unit: off A's face, or across the axis
+  bool copy = false;          ///< B is A's like
+  bool parts = false;         ///< any displacement along `direction` separates them
 };
 
 class RandomMates {
@@ -256,7 +256,7 @@ class RandomMates {
         turn(one_in(2), fifteens);
         mate.t = {one_in(2) ? 0 : length() - 1, one_in(2) ? 0 : length() - 1,
                   mate.a.high - mate.b_turned.low};
-        mate.way = Vector3d::UnitZ();
+        mate.direction = Vector3d::UnitZ();
         mate.parts = true;
         break;
       }
@@ -268,7 +268,7 @@ class RandomMates {
         // In its corners, or across them.
         turn(one_in(3), one_in(2) ? fifteens : 360.0 / corners * whole(0, int(corners)));
         mate.t = {0, 0, one_in(2) ? -mate.b_turned.low : mate.a.high / 2 - mate.b_turned.low};
-        mate.way = across();
+        mate.direction = across();
         break;
       }
       case 2: {
@@ -279,7 +279,7 @@ class RandomMates {
         const bool flip = one_in(3);
         turn(flip, fifteens);
         mate.t = {0, 0, mate.a.low - mate.b_turned.low};
-        mate.way = one_in(2) ? Vector3d(Vector3d::UnitZ()) : across();
+        mate.direction = one_in(2) ? Vector3d(Vector3d::UnitZ()) : across();
         break;
       }
       case 3: {
@@ -295,7 +295,7 @@ class RandomMates {
         };
         mate.t = {right(mate.a) + right(mate.b_turned), one_in(2) ? 0 : (length() - 1) / 4,
                   one_in(2) ? 0 : (length() - 1) / 4};
-        mate.way = Vector3d::UnitX();
+        mate.direction = Vector3d::UnitX();
         mate.parts = true;
         break;
       }
@@ -307,7 +307,7 @@ class RandomMates {
         turn(one_in(2), one_in(2) ? 180 : 0);
         mate.t = {0, (mate.b.points[2].y() - mate.b.points[1].y()) / 2,
                   one_in(2) ? -mate.b_turned.low : length() / 2};
-        mate.way = Vector3d::UnitY();
+        mate.direction = Vector3d::UnitY();
         break;
       }
       default: {
@@ -322,7 +322,7 @@ class RandomMates {
         const Vector3d after = (mate.q * edges).cwiseAbs();
         mate.b_turned = Extrusion::rectangle(after.x(), after.y(), after.z());
         mate.t = {one_in(2) ? 0 : length() - 1, 0, mate.a.high - mate.b_turned.low};
-        mate.way = Vector3d::UnitZ();
+        mate.direction = Vector3d::UnitZ();
         mate.parts = true;
       }
     }

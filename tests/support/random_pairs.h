@@ -52,7 +52,7 @@ class RandomPairs {
   }
   std::uint32_t asset() { return static_cast<std::uint32_t>(random_() % batch_assets().size()); }
 
-  /// Of solids that meet more often than not, of like and unlike sizes.
+  /// Pairs of solids of like and unlike sizes; most of them overlap.
   std::vector<BatchPair> pairs(std::size_t count) {
     std::vector<BatchPair> out;
     for (std::size_t k = 0; k < count; ++k) {
@@ -63,7 +63,7 @@ class RandomPairs {
     return out;
   }
 
-  /// Of solids that are apart, near, in touch and in each other.
+  /// Pairs of solids that are apart, near, touching and overlapping.
   std::vector<BatchPair> pairs_at_all_distances(std::size_t count) {
     std::vector<BatchPair> out = pairs(count);
     for (std::size_t i = 0; i < count; ++i) {

@@ -17,7 +17,7 @@ namespace ist::testing {
 
 using NamedPairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
-/// A cube, a slab beside its frame's origin, and shapes, of which one has no end and one is none.
+/// A cube, a slab beside its frame's origin, and shapes, one of which is unbounded and one invalid.
 inline std::vector<GpuSolid> some_solids() {
   static const Asset cube = baked(box_mesh({-1, -1, -1}, {1, 1, 1}), "cube", 60);
   static const Asset off_centre = baked(box_mesh({0.5, -1, 0}, {1, 3, 0.25}), "slab", 60);
@@ -44,7 +44,7 @@ struct RandomScene {
     const double side = 2 * std::cbrt(static_cast<double>(count) / worlds) + 1;
     for (std::size_t i = 0; i < count; ++i) {
       GpuSceneBody body;
-      // Few are shapes, of which some have no end.
+      // Few are shapes, some of which are unbounded.
       const bool any = below(20) == 0;
       body.solid = static_cast<std::uint32_t>(any ? below(solids.size()) : 0);
       body.scale = below(3) == 0 ? std::exp2(uniform(-3, 2)) : 1;
@@ -102,7 +102,7 @@ struct RandomScene {
       rule.margin = settings.margin;
       for (std::uint32_t a = 0; a < kSceneGroups; ++a)
         for (std::uint32_t b = a; b < kSceneGroups; ++b) scene.set_rule(a, b, rule);
-      // Of a group without bodies: boxes are as wide as the widest rule needs.
+      // A rule for a group without bodies: boxes are as wide as the widest rule needs.
       rule.answer = SceneAnswer::penetration;
       rule.penetration.measure = settings.measure;
       scene.set_rule(1, 1, rule);

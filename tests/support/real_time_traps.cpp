@@ -80,7 +80,7 @@ Trapped trapped_so_far() noexcept { return {heap_calls, lock_calls}; }
 namespace detail {
 namespace {
 
-/// What parent and child share.
+/// Memory that parent and child share.
 struct Watch {
   volatile int number = -1;
   volatile bool filtered = false;

@@ -6,8 +6,8 @@
 
 namespace ist::testing {
 
-/// Where the oracle and the meshes lie: the environment variable IST_SHARED, else ../shared beside
-/// the source tree.
+/// A path in the folder of the oracle and the meshes: the environment variable IST_SHARED, else
+/// ../shared beside the source tree.
 inline std::filesystem::path shared_path(const std::string& relative) {
   const char* root = std::getenv("IST_SHARED");
   const std::filesystem::path base = root != nullptr

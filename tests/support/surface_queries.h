@@ -70,10 +70,10 @@ struct Work {
   double done = 0;    ///< ∫ of the forces and torques
   double moved = 0;   ///< ∫ of their magnitudes, whatever the direction
   double change = 0;  ///< of the volume
-  double most = 0;    ///< largest volume on the way
+  double most = 0;    ///< largest volume along the motion
 };
 
-/// By Simpson's rule from s = 0 to 1.
+/// Integrates by Simpson's rule from s = 0 to 1.
 inline Work work_of(const Ask& ask, const Sweep& motion, int steps) {
   Work work;
   for (int i = 0; i <= 2 * steps; ++i) {

@@ -56,7 +56,7 @@ TEST(Asset, RoundTrip) {
   EXPECT_EQ(folder.files(), 1u);
 }
 
-/// What was moved from is empty, and may be asked anything.
+/// A moved-from asset is empty, and every function may be called.
 TEST(Asset, MovedFromAssetsAndWorkspacesAreSafe) {
   Asset asset(small_asset(40), "memory");
   Asset taken = std::move(asset);
@@ -138,7 +138,7 @@ TEST(AssetSave, KeepsTheOldFileIfTheDiskIsFull) {
   const Asset old_asset(small_asset(17), "old");
   const Asset large(small_asset(900), "new");
   old_asset.save(folder / "a.ist");
-  // The largest file that this process may write stands in for a full disk.
+  // The largest file that this process may write replaces a full disk.
   rlimit before;
   getrlimit(RLIMIT_FSIZE, &before);
   const rlimit small = {50'000, before.rlim_max};
@@ -163,7 +163,7 @@ TEST(AssetSave, PassesOverNamesThatAreTaken) {
   EXPECT_EQ(folder.files(), 51u);
 }
 
-// Without a folder in its name the file goes to where the program runs.
+// Without a folder in its name the file is written to the current folder.
 TEST(AssetSave, TakesABareName) {
   const TemporaryFolder folder;
   const std::filesystem::path before = std::filesystem::current_path();

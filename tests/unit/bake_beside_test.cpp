@@ -18,7 +18,7 @@
 namespace ist {
 namespace {
 
-/// What the stand-ins of a bake saw.
+/// The calls that a bake's stand-ins received.
 struct Seen {
   std::atomic<int> beside = 0;
   std::atomic<bool> levels_fail = false;

@@ -79,8 +79,8 @@ TEST(BakeSolid, SeparationIntervalsHoldTheExactGap) {
   for (const double gap : {0.001, 0.02, 0.3, 2.0})
     for (int turn = 0; turn < 3; ++turn) {
       Pose pose;
-      const Vector3d way = Vector3d(1, 0.3 * turn, -0.2 * turn).normalized() * (2 + gap);
-      for (int k = 0; k < 3; ++k) pose.t[k] = way[k];
+      const Vector3d offset = Vector3d(1, 0.3 * turn, -0.2 * turn).normalized() * (2 + gap);
+      for (int k = 0; k < 3; ++k) pose.t[k] = offset[k];
       const Separation s =
           separation({ball_asset().view(), {}}, {ball_asset().view(), pose}, {}, scratch);
       EXPECT_LE(s.distance_min, gap);

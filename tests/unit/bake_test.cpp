@@ -289,7 +289,7 @@ TEST(Bake, SameBytesForAnyThreadCountOfAScan) {
     EXPECT_EQ(one, bytes_of(bake(dino, testing::of_size(200, threads))));
 }
 
-/// The asset without what says where and how large the mesh is.
+/// The asset without the mesh's offset and size.
 std::vector<std::byte> frameless(const Asset& asset) {
   std::vector<std::byte> bytes = bytes_of(asset);
   AssetHeader header;

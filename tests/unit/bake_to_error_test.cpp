@@ -19,7 +19,7 @@
 namespace ist {
 namespace {
 
-// Of this thread: other programs of a busy machine do not count.
+// The time of this thread: other programs of a busy machine do not count.
 double thread_seconds() {
   timespec now = {};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -104,7 +104,7 @@ TEST(BakeToError, AMetTargetHoldsAtOtherPoses) {
   std::nth_element(errors.begin(), errors.begin() + 30, errors.end());
   EXPECT_LE(errors[30], kTarget.relative_error);
 
-  // What the result says stands in the asset.
+  // The asset contains the values of the result.
   const PredictedErrors errors_in_asset = body.mesh.predicted_errors();
   EXPECT_TRUE(errors_in_asset.target_met());
   EXPECT_EQ(errors_in_asset.measured_error, result.measured_error);
@@ -152,7 +152,7 @@ TEST(BakeToError, AMissedTargetIsSaidWithItsReason) {
   EXPECT_FALSE(thin.asset.view().predicted_errors().target_met());
 }
 
-// The truth is the solid's, whatever surface the asset keeps.
+// The truth is the solid's, whatever mesh the asset stores.
 TEST(BakeToError, MeasuresByTheMeshThatTheAssetDoesNotKeep) {
   const ClosedMesh torus = testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
   PackingSettings settings = {.max_spheres = 200};

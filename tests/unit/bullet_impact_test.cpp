@@ -17,7 +17,7 @@ struct Solid {
   AssetView tree;
 };
 
-/// Of 0.1 to 0.2 m.
+/// Bodies of 0.1 to 0.2 m.
 const std::vector<Solid>& solids() {
   static const Asset ring = baked(torus_mesh(0.045, 0.015, 32, 16), "ring", 500);
   static const Asset plate = baked(box_mesh({-0.1, -0.1, -0.01}, {0.1, 0.1, 0.01}), "plate", 500);

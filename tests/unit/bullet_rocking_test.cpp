@@ -1,4 +1,4 @@
-// What rocks or rolls on a table loses energy and comes to rest.
+// A body that rocks or rolls on a table loses energy and comes to rest.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -84,7 +84,7 @@ TEST(Support, CornersOfExactContactsSumToTheWhole) {
   }
 }
 
-// What spheres blur the planes tell: a plate that is 0.01 mm deep has its four corners, its area
+// Planes correct the blur of spheres: a plate that is 0.01 mm deep has its four corners, its area
 // and its volume; one that is 0.01 mm above has none.
 TEST(Support, SpheresTakeTheirDepthsFromTheFaces) {
   Workspace workspace;
@@ -199,7 +199,7 @@ TEST(BulletSupport, ABoxStandsOverAnEdgeAsFarAsItsMiddle) {
   }
   EXPECT_FALSE(stands(std::make_unique<btBoxShape>(btVector3(0.1, 0.1, 0.1)), under, 0.51));
   EXPECT_FALSE(stands(cube_of_side(kBox), under, 0.51));
-  // As it settles into its springs it turns: the less they give, the nearer to 0.5.
+  // It tilts as it settles into its springs: the stiffer they are, the nearer to 0.5.
   EXPECT_TRUE(stands(cube_of_side(kBox), under, 0.49, 1e-4));
 }
 

@@ -14,7 +14,7 @@
 namespace ist::testing {
 namespace {
 
-// The default asks for meshes: an asset that keeps none still collides, by its spheres.
+// The default uses meshes: an asset without one still collides, by its spheres.
 TEST(BulletShapes, WithoutAMeshCollideByLenses) {
   PackingSettings packing;
   packing.max_spheres = 500;
@@ -371,7 +371,7 @@ TEST(BulletMaterial, WithoutGravityTheStepSaysHowHard) {
   EXPECT_LT(box.getLinearVelocity().length(), 0.5 * std::exp(-2.0));  // as of a critical spring
 }
 
-/// How high it comes again that falls by 0.1 m, of that height.
+/// The rebound height of a fall from 0.1 m, relative to that height.
 double bounce(double restitution) {
   World world;
   world.add_ground();

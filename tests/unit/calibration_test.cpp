@@ -229,7 +229,8 @@ TEST(Calibration, ScaleByAPowerOfTwoChangesNothing) {
   EXPECT_EQ(std::memcmp(a.matched.data(), b.matched.data(), 100 * sizeof(Sphere)), 0);
 }
 
-/// A plate of any thickness, turned any way, is shared out evenly among an even grid of spheres.
+/// A plate of any thickness, rotated in any direction, is divided evenly among an even grid of
+/// spheres.
 TEST(Calibration, MeasuresThinPlates) {
   for (const double thickness : {1e-2, 1e-6})
     for (int k = 0; k < 8; ++k) {

@@ -10,7 +10,7 @@
 namespace ist {
 namespace {
 
-// Two independent ways to the same answer: what packing asks and what check asks.
+// Two independent implementations of the same answer: that of packing and that of check.
 TEST(CheckedMesh, AgreesWithTheSolid) {
   const TriangleMesh meshes[] = {
       testing::cube_mesh(), testing::torus_mesh(1.0, 0.4, 40, 20), testing::icosphere_mesh(3),

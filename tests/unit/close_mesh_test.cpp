@@ -175,7 +175,7 @@ TEST(CloseMesh, CoincidentFacesAreTheirSignedSum) {
   const ClosedMesh twice = close_mesh(joined(cube_mesh(), cube_mesh()), "twice");
   EXPECT_EQ(twice.report.coincident_triangles, 12u);
   EXPECT_DOUBLE_EQ(twice.report.volume, 1);
-  // Face to face: the double wall goes.
+  // Face to face: the double wall is removed.
   const TriangleMesh block = joined(box_mesh(kZero, {1, 1, 1}),
                                     scaled_and_moved(box_mesh(kZero, {1, 1, 1}), 1, {1, 0, 0}));
   const ClosedMesh joined_block = close_mesh(block, "block");
@@ -200,7 +200,7 @@ TEST(CloseMesh, CoincidentFacesAreTheirSignedSum) {
 }
 
 TEST(CloseMesh, SharedWallOfTwoOverlappingShellsIsKeptTwice) {
-  // Two boxes that share the face z = 0 facing the same way: the sum of two is needed there.
+  // Two boxes that share the face z = 0 with the same orientation: their sum is needed there.
   const TriangleMesh two = joined(box_mesh(kZero, {1, 1, 1}), box_mesh(kZero, {1, 1, 2}));
   const ClosedMesh closed = close_mesh(two, "two");
   EXPECT_EQ(closed.report.coincident_triangles, 0u);

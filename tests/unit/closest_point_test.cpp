@@ -297,7 +297,7 @@ TEST(ClosestPoint, IsTheMinimumOverAllTriangles) {
       ASSERT_EQ(closest.distance, std::sqrt(best2));
       ASSERT_EQ(closest.triangle, best);
       ASSERT_NEAR((closest.point - p).norm(), closest.distance, 1e-15 * (1 + p.norm()));
-      // A limit changes nothing but what lies beyond it.
+      // A limit changes only results beyond it.
       ASSERT_EQ(solid.closest_point(p, closest.distance * (1 + 1e-12) + 1e-150).triangle, best);
       ASSERT_EQ(solid.closest_point(p, closest.distance / 2).distance, closest.distance / 2);
     }

@@ -129,7 +129,7 @@ TEST(CoverSpheres, TheProofSeesAVoidInside) {
   EXPECT_TRUE(prove_cover(mesh, shell).covered);
 }
 
-/// Every ball around a ball protrudes everywhere by about as much: the search has no way down.
+/// Every ball around a ball protrudes everywhere by about as much: the search finds no descent.
 TEST(CoverSpheres, FewSpheresOnABallAreHardlyWorseThanOneAroundIt) {
   const ClosedMesh mesh = close_mesh(icosphere_mesh(2), "ball");
   const std::vector<CoverSphere> around = {{{0, 0, 0}, 1 + 1e-9}};
@@ -243,7 +243,7 @@ TEST(CoverSpheres, ATotalGoesWhereItIsNeeded) {
   EXPECT_THROW(cover_with_spheres(meshes, settings), Error);
 }
 
-/// Of all ways to share out, none has a smaller largest estimate.
+/// No other distribution has a smaller maximum of estimates.
 TEST(CoverSpheres, SharesAreTheBestOfTheEstimates) {
   const std::vector<TriedCounts> tried = {{{2, 0.5}, {6, 0.1}}, {{1, 0.3}}, {{3, 0.05}, {4, 0.2}}};
   EXPECT_EQ(estimated_protrusion(tried[0], 2), 0.5);
@@ -299,13 +299,13 @@ TEST(CoverSpheres, ProtrudeLessWhereThereIsLessRoom) {
   EXPECT_TRUE(prove_cover(mesh, cover.spheres).covered);
   EXPECT_LT(protrusion_above(3.8, cover, box), 1.2 * least);
   EXPECT_LT(cover.protrusion.largest, 0.12);
-  // It takes more, where there is less room alone.
+  // It takes more only where there is less space.
   EXPECT_GT(cover.spheres.size(), even.spheres.size());
   const std::size_t estimate = estimated_count(mesh, 0.1, room);
   EXPECT_LE(cover.spheres.size(), estimate);
   EXPECT_GT(2 * cover.spheres.size(), estimate);
   EXPECT_LT(cover.spheres.size(), estimated_count(mesh, least));
-  // Equal meshes of which one has less room are not covered alike.
+  // Equal meshes with different free space are covered differently.
   settings.room.push_back(nullptr);
   const std::vector<ClosedMesh> both = {mesh, mesh};
   EXPECT_EQ(cover_with_spheres(both, settings)[1].spheres.size(), even.spheres.size());
@@ -432,11 +432,11 @@ TEST(ExtendCover, ContainsASheetBesideTheSolid) {
         return (x - s.centre).norm() <= s.radius;
       })) << x.transpose();
     }
-  // No sphere that was added reaches further from the sheet than is told.
+  // No added sphere reaches further from the sheet than reported.
   for (std::size_t k = 1; k < cover.spheres.size(); ++k)
     EXPECT_LE(cover.spheres[k].radius, cover.protrusion.largest);
 
-  // What is covered stays as it is.
+  // A covered surface stays unchanged.
   for (Eigen::Vector3d& x : sheet.vertices) x *= 0.2;
   cover.spheres = {{{0, 0, 0}, 1.2}};
   cover.protrusion.largest = 0.2;

@@ -72,7 +72,7 @@ TEST(GpuDetails, BudgetsAreTheCpus) {
   expect_same_bits(batch.run(pairs, Measure::inner, 0, 40), batch.run(pairs, Measure::inner));
 }
 
-/// By which a budget's shares are told, with the slopes that go into the gradients.
+/// Determines a budget's shares, with the slopes for the gradients.
 TEST(GpuDetails, QuickLooksAreTheCpus) {
   const HostSolids solids(detailed_solids());
   const auto memory = std::make_unique<gpu::FilledMemory>();
@@ -94,7 +94,7 @@ TEST(GpuDetails, QuickLooksAreTheCpus) {
         SphereTree(header_a, matched_tree(header_a, header_a.detail_count)),
         SphereTree(header_b, matched_tree(header_b, header_b.detail_count)), pose->a_from_b, true);
     met += cpu.volume > 0 ? 1 : 0;
-    // The CPU's balls stand where floats say.
+    // The CPU's balls have float positions.
     EXPECT_NEAR(gpu.volume, cpu.volume, 1e-5 * cpu.volume + 1e-6 * norm(cpu.slope.by_translation));
     const double slope = 1e-4 * (norm(cpu.slope.by_translation) + std::cbrt(cpu.volume) * 0.1);
     for (int k = 0; k < 3; ++k) {

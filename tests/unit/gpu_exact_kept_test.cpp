@@ -6,7 +6,7 @@
 
 #include "support/exact_batches.h"
 
-// What exact batches of the GPU keep from call to call: their source run by teams of the host
+// Data that exact batches of the GPU keep from call to call: their source run by teams of the host
 // (gpu_exact_test.cpp).
 
 namespace ist::testing {
@@ -73,7 +73,7 @@ TEST(GpuExactKept, StepsHaveTheBitsOfASearch) {
   EXPECT_GT(both.met, 1000u);
 }
 
-/// What goes straight on comes to the end of each margin: pairs that were not kept would be missed.
+/// A straight motion reaches the end of each margin: pairs that were not kept would be missed.
 TEST(GpuExactKept, MarginsHoldToTheirEnds) {
   RandomPairs random(69);
   std::vector<BatchPair> pairs;
@@ -100,7 +100,7 @@ TEST(GpuExactKept, MarginsHoldToTheirEnds) {
   EXPECT_GT(both.met, 600u);
 }
 
-/// Which lane does what, and when, must not show.
+/// Results must not depend on which lane does what, and when.
 TEST(GpuExactKept, LanesOfAWarpNeedNoLuck) {
   std::vector<BatchPair> pairs = exact_pairs(63, 12);
   for (const BatchPair& pair : aligned_pairs(64, 8)) pairs.push_back(pair);
@@ -149,8 +149,8 @@ TEST(GpuExactKept, SmallSolidsTurnBesideLargeOnes) {
   EXPECT_GT(both.held, 500u);
 }
 
-/// What has no room is searched in each call.
-TEST(GpuExactKept, LittleRoomDoesNotShow) {
+/// Pairs without memory are searched in each call.
+TEST(GpuExactKept, LittleMemoryDoesNotShow) {
   const std::vector<BatchPair> pairs = exact_pairs(68, 100);
   Beside both(exact_assets(), pairs.size(), 1024);
   both.kept.mesh_capacity = 7;

@@ -48,7 +48,7 @@ TEST(GpuExactPatches, OfMatesAreTheCpus) {
 
 TEST(GpuExactPatches, WhatGrazesIsTheCpus) { ask(exact_assets(), grazing_pairs(), 4); }
 
-/// Legs on a plate, teeth in a block whose sides are single triangles, a cavity in what overlaps.
+/// Legs on a plate, teeth in a block whose sides are single triangles, a cavity in the overlap.
 struct ManyParts {
   std::vector<Asset> assets;
   std::vector<BatchPair> pairs;
@@ -75,7 +75,7 @@ struct ManyParts {
       pairs.push_back(pair);
     };
     for (const double down : {-0.1, -1e-9, 0.0, -0.95}) add(0, 1, 0.01, 0.02, down);
-    add(1, 0, 0.01, 0.02, 0.1);  // the other way round
+    add(1, 0, 0.01, 0.02, 0.1);  // exchanged
     add(2, 1, 0.1, 0.1, 2.9);    // into a side of two triangles
     add(0, 2, 0, 0, 2.9);
     add(2, 0, 0, 0, 0.2);  // a cavity's wall
@@ -98,7 +98,7 @@ TEST(GpuExactPatches, OfManyPartsAreTheCpus) {
   }
 }
 
-/// Which lane does what, and when, must not show.
+/// Results must not depend on which lane does what, and when.
 TEST(GpuExactPatches, LanesOfAWarpNeedNoLuck) {
   const ManyParts many;
   const MatedBatch mated(64, 6);
@@ -114,7 +114,7 @@ TEST(GpuExactPatches, LanesOfAWarpNeedNoLuck) {
   }
 }
 
-/// The whole is that of a batch of penetrations; without patches it is all that is asked.
+/// The whole is that of a batch of penetrations; without patches it is the only result.
 TEST(GpuExactPatches, WholesAreThoseOfPenetrations) {
   const std::vector<BatchPair> pairs = aligned_pairs(67, 200);
   const std::vector<Penetration> expected = HostBatch(exact_solids()).run(pairs, Measure::exact);
@@ -128,8 +128,9 @@ TEST(GpuExactPatches, WholesAreThoseOfPenetrations) {
   }
 }
 
-/// What the first pass has no room for the second answers alike; what that has none for says so.
-TEST(GpuExactPatches, LittleRoomDoesNotShow) {
+/// The second pass answers pairs that do not fit into the first; pairs that fit into none are
+/// reported.
+TEST(GpuExactPatches, LittleMemoryDoesNotShow) {
   std::vector<BatchPair> pairs = exact_pairs(68, 100);
   for (const BatchPair& pair : aligned_pairs(69, 100)) pairs.push_back(pair);
   HostPatches batch(exact_solids());

@@ -35,7 +35,7 @@ TEST(GpuExact, AlignedAnswersAreTheCpus) {
   expect_near(worst);
 }
 
-/// Where parts touch, the area and the normal of the faces that lie on each other too.
+/// For touching parts, also the area and normal of the faces that lie on each other.
 TEST(GpuExact, MatesTouchAsOnTheCpu) {
   const MatedBatch mated(32, 300);
   HostBatch batch(views_of(mated.assets));
@@ -46,7 +46,7 @@ TEST(GpuExact, MatesTouchAsOnTheCpu) {
   expect_near(worst);
 }
 
-/// An edge that goes into a face by 1e-9 has next to no volume, but touches no more.
+/// An edge that enters a face by 1e-9 has next to no volume, but touches no more.
 TEST(GpuExact, WhatGrazesIsToldAsOnTheCpu) {
   const std::vector<BatchPair> pairs = grazing_pairs();
   HostBatch batch(exact_solids());
@@ -58,7 +58,7 @@ TEST(GpuExact, WhatGrazesIsToldAsOnTheCpu) {
   expect_near(worst);
 }
 
-/// Of a pin in its hole what sums round is nothing, but not if a needle beside it goes deep.
+/// A pin in its hole has no volume except rounding, unless a needle beside it goes deep.
 TEST(GpuExact, ANeedleBesideFacesIsAVolume) {
   const TriangleMesh tube = Extrusion::tube(24, 1, 0.5, 0, 1).mesh(),
                      pin = Extrusion::prism(24, 0.5, 0, 1).mesh(),
@@ -120,7 +120,7 @@ TEST(GpuExact, AnyRatioOfSizes) {
 }
 
 /// Copies about one middle: in place and next to it few blocks cross, turned all do, for which the
-/// first two passes have no room.
+/// first two passes have no memory.
 TEST(GpuExact, LargeCopiesAreAnswered) {
   std::vector<Asset> assets;
   assets.push_back(surface(icosphere_mesh(5), "ball"));
@@ -133,8 +133,8 @@ TEST(GpuExact, LargeCopiesAreAnswered) {
   expect_near(compare_exactly(assets, pairs, answers));
 }
 
-/// What a round has no room for, later rounds and passes answer alike.
-TEST(GpuExact, LittleRoomDoesNotShow) {
+/// Later rounds and passes answer pairs that do not fit into a round.
+TEST(GpuExact, LittleMemoryDoesNotShow) {
   std::vector<BatchPair> pairs = exact_pairs(38, 300);
   for (const BatchPair& pair : aligned_pairs(39, 100)) pairs.push_back(pair);
   HostBatch batch(exact_solids());
@@ -151,7 +151,7 @@ TEST(GpuExact, LittleRoomDoesNotShow) {
   EXPECT_EQ(batch.rounds, 2u);
 }
 
-/// Which lane does what, and when, must not show.
+/// Results must not depend on which lane does what, and when.
 TEST(GpuExact, LanesOfAWarpNeedNoLuck) {
   std::vector<BatchPair> pairs = exact_pairs(34, 30);
   for (const BatchPair& pair : aligned_pairs(36, 20)) pairs.push_back(pair);

@@ -66,8 +66,8 @@ Penetration by_cpu(const Shape& field, const BatchPair& pair, Measure measure) {
                      settings, workspace);
 }
 
-/// By how much an answer is off: parts of the volume, and of the surface or lever that go with the
-/// larger of it and of a thousandth of what the tree has.
+/// Errors of an answer, relative to the larger of its volume and 1e-6 size³, and to the area and
+/// lever that belong to it.
 struct FieldOff {
   double volume = 0, push = 0, turn = 0, centre = 0;
 
@@ -146,7 +146,7 @@ TEST(GpuFields, AlignedSolidsToo) {
   EXPECT_LE(off.centre, 1e-9);
 }
 
-/// A ball whose centre lies on an edge cannot tell from there on which side of a triangle it is.
+/// A ball whose centre lies on an edge does not determine its side of a triangle.
 TEST(GpuFields, CentresOnEdges) {
   static const std::vector<float> slope = [] {
     std::vector<float> h;
@@ -259,7 +259,7 @@ TEST(GpuFields, ProbesOfAnySize) {
     std::printf("%8g: volume %.1e push %.1e turn %.1e centroid %.1e; %d crossed\n", scale,
                 off.volume, off.push, off.turn, off.centre, met);
     EXPECT_GE(met, 5) << scale;
-    // Where a probe is, is told in the field's digits.
+    // A probe's place has the precision of the field's coordinates.
     const double allowed = std::max(1e-11, 1e-15 / scale);
     EXPECT_LE(off.volume, allowed) << scale;
     EXPECT_LE(off.push, allowed) << scale;
@@ -285,8 +285,8 @@ TEST(GpuFields, LanesOfAWarpNeedNoLuck) {
   }
 }
 
-/// However many rounds there are, and whether pairs find room in one.
-TEST(GpuFields, RoomChangesNoBit) {
+/// However many rounds there are, and whether pairs fit into one.
+TEST(GpuFields, CapacityChangesNoBit) {
   const auto count = static_cast<std::uint32_t>(batch_fields().size());
   std::vector<BatchPair> pairs;
   for (std::uint32_t f = 0; f < count; ++f)
@@ -306,25 +306,25 @@ TEST(GpuFields, RoomChangesNoBit) {
   const auto large = [](const HostBatch& batch) { return batch.field_counters.large; };
   EXPECT_GT(roomy.field_counters.listed[gpu::kFacets], 30u);
 
-  struct Room {
+  struct Capacities {
     const char* of;
     std::uint32_t queries, parts, words, most_rounds;
     bool more_are_large, many_rounds;
   };
-  for (const Room& room : {Room{"few pairs", 3, 300, 30000, ~0u, false, true},
-                           Room{"few parts", 40, 5, 30000, ~0u, true, false},
-                           Room{"few words", 40, 300, 520, ~0u, true, true},
-                           Room{"few rounds", 5, 300, 30000, 2, false, false},
-                           Room{"none", 5, 300, 30000, 0, false, false}}) {
+  for (const Capacities& capacities : {Capacities{"few pairs", 3, 300, 30000, ~0u, false, true},
+                                       Capacities{"few parts", 40, 5, 30000, ~0u, true, false},
+                                       Capacities{"few words", 40, 300, 520, ~0u, true, true},
+                                       Capacities{"few rounds", 5, 300, 30000, 2, false, false},
+                                       Capacities{"none", 5, 300, 30000, 0, false, false}}) {
     HostBatch batch(mixed_solids());
-    batch.query_capacity = room.queries;
-    batch.part_capacity = room.parts;
-    batch.word_capacity = room.words;
-    batch.most_rounds = room.most_rounds;
-    SCOPED_TRACE(room.of);
+    batch.query_capacity = capacities.queries;
+    batch.part_capacity = capacities.parts;
+    batch.word_capacity = capacities.words;
+    batch.most_rounds = capacities.most_rounds;
+    SCOPED_TRACE(capacities.of);
     expect_same_bits(batch.run(pairs, Measure::matched, 1), expected);
-    EXPECT_EQ(large(batch) > large(roomy), room.more_are_large) << large(batch);
-    EXPECT_EQ(batch.rounds > 20, room.many_rounds) << batch.rounds;
+    EXPECT_EQ(large(batch) > large(roomy), capacities.more_are_large) << large(batch);
+    EXPECT_EQ(batch.rounds > 20, capacities.many_rounds) << batch.rounds;
   }
 }
 
@@ -393,7 +393,7 @@ TEST(GpuFields, ABatchMixesPairsInAnyOrder) {
   expect_same_bits(HostBatch(solids).run(pairs, Measure::matched, 1), expected);
 }
 
-/// Two fields hold no spheres, and a query of two trees takes no field.
+/// Two fields have no spheres, and a query of two trees takes no field.
 TEST(GpuFields, WhatHoldsNoSpheresIsNotHeld) {
   const std::vector<GpuSolid> solids = mixed_solids();
   std::vector<BatchPair> pairs(4);

@@ -63,7 +63,7 @@ TEST(GpuMeshGaps, FartherThanAskedIsNotTold) {
   }
 }
 
-/// What a limit leaves out may be as near as the interval says.
+/// Pairs that a limit leaves out may be as near as the interval states.
 TEST(GpuMeshGaps, IntervalsOfALimitHoldTheFinishedOnes) {
   const std::vector<BatchPair> pairs = mesh_gap_pairs(46, 300);
   HostSeparations batch(exact_solids());
@@ -80,14 +80,14 @@ TEST(GpuMeshGaps, IntervalsOfALimitHoldTheFinishedOnes) {
       ++stopped;
       EXPECT_EQ(answers[i].status, QueryStatus::budget_exhausted);
       EXPECT_LE(answers[i].distance_min, finished[i].distance) << i;
-      // Of pairs that are as near, to rounding, it may not have come to the one that answers.
+      // Among equally near pairs, it may not have reached the one that answers.
       EXPECT_GE(answers[i].distance, (1 - 1e-14) * finished[i].distance) << i;
     }
     EXPECT_GT(stopped, most <= 20 ? 20u : 0u) << most;
   }
 }
 
-/// Which lane does what, and when, and who shares a round, must not show.
+/// Results must not depend on which lane does what, and when, or on the pairs of a round.
 TEST(GpuMeshGaps, LanesOfAWarpNeedNoLuck) {
   std::vector<BatchPair> pairs = mesh_gap_pairs(47, 40);
   for (const BatchPair& pair : aligned_gap_pairs(48, 30)) pairs.push_back(pair);

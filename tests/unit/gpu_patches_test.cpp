@@ -35,7 +35,7 @@ bool same_regions(std::span<const ContactPatch> x, std::span<const ContactPatch>
                     [](const auto& p, const auto& q) { return p.id == q.id; });
 }
 
-/// What patches differ by from the CPU's, which are float sums.
+/// The difference of patches from the CPU's, which are float sums.
 struct PatchDifference {
   double volume = 0;    ///< relative
   double force = 0;     ///< of area, or of volume^(2/3) if more
@@ -50,13 +50,13 @@ struct PatchDifference {
     force = std::max(force, (x.force - y.force).norm() / reach);
     torque = std::max(torque, (x.torque - y.torque).norm() / (reach * size));
     centroid = std::max(centroid, (x.centroid - y.centroid).norm() / (size + 2 * pair.scale_a));
-    // What is left of the torque once the force acts at the point is the torsion about the normal.
+    // The remaining torque of a force at the point is the torsion about the normal.
     const Eigen::Vector3d left =
         x.torque - (x.point - Eigen::Vector3d(pair.pose_b.t)).cross(x.force) - x.torsion * x.normal;
     const Eigen::Vector3d arm = x.point - x.centroid;
-    const double room = size + arm.norm() + 1e-6 * x.point.norm();  // world coordinates round
-    axis = std::max(axis, x.area > 0 ? left.norm() / (reach * room) : std::abs(x.torsion));
-    axis = std::max(axis, std::abs(arm.dot(x.normal)) / room);
+    const double extent = size + arm.norm() + 1e-6 * x.point.norm();  // world coordinates round
+    axis = std::max(axis, x.area > 0 ? left.norm() / (reach * extent) : std::abs(x.torsion));
+    axis = std::max(axis, std::abs(arm.dot(x.normal)) / extent);
   }
 };
 
@@ -146,18 +146,19 @@ class RegionSums {
         double moved[3];
         place.a_from_b.apply(y.centre, moved);
         const Vector3d from = Eigen::Map<const Vector3d>(x.centre);
-        const Vector3d way = Eigen::Map<const Vector3d>(moved) - from;
-        const Lens<double> l = lens(x.r, y.r * place.a_from_b.scale, way.norm());
+        const Vector3d between = Eigen::Map<const Vector3d>(moved) - from;
+        const Lens<double> l = lens(x.r, y.r * place.a_from_b.scale, between.norm());
         if (!(l.volume() > 0)) continue;
         const double unit = place.unit_a;
         Sum& sum = sums_[cuts_.rank[(of_b ? j : i) >> cuts_.shift]];
         const double volume = unit * unit * unit * l.volume();
-        const Vector3d force = -unit * unit * l.derivative() * (to_world * way.normalized());
+        const Vector3d force = -unit * unit * l.derivative() * (to_world * between.normalized());
         sum.volume += volume;
         sum.pushed += force.norm();
         sum.force += force;
-        sum.moment += volume * (unit * (to_world * (from + l.cap_b / (l.cap_a + l.cap_b) * way)) +
-                                vector(place.origin_a));
+        sum.moment +=
+            volume * (unit * (to_world * (from + l.cap_b / (l.cap_a + l.cap_b) * between)) +
+                      vector(place.origin_a));
       }
     }
   }
@@ -180,8 +181,8 @@ class RegionSums {
   std::vector<Sum> sums_;
 };
 
-/// What is too little for a patch of its own falls to one whose region it is not in: pairs that
-/// have such are left out.
+/// Volumes that are too small for a patch of their own go to a patch of another region: pairs with
+/// such volumes are left out.
 TEST(GpuPatches, AreTheRegionsSumsInDouble) {
   const std::vector<BatchPair> pairs = RandomPairs(47).pairs(150);
   const HostSolids solids(batch_solids());

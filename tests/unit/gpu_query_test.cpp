@@ -88,7 +88,7 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
   const std::vector<BatchPair> pairs = poses.pairs(400);
   double worst = 0, worst_push = 0, worst_turn = 0, worst_centre = 0;
   std::size_t met = 0;
-  // As batches of few pairs are cut up, and of many.
+  // Split like batches of few pairs, and of many.
   for (const auto& [measure, most_pairs] :
        {std::pair{Measure::matched, 1}, {Measure::matched, 1'000'000}, {Measure::inner, 1}}) {
     HostBatch batch(batch_solids());
@@ -106,7 +106,7 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
       const double size = 2 * pairs[i].scale_b;
       worst = std::max(worst, std::abs(answers[i].volume / sum.volume - 1));
       worst_centre = std::max(worst_centre, (answers[i].centroid - sum.centroid()).norm() / size);
-      // Of a ball that all but lies in another the force is a small rest.
+      // If a ball is almost inside another, the force is a small remainder.
       const double area = sum.force_scale + std::cbrt(sum.volume * sum.volume);
       worst_push = std::max(worst_push, (answers[i].force - sum.force).norm() / area);
       worst_turn = std::max(worst_turn, (answers[i].torque - sum.torque).norm() / (area * size));
@@ -125,38 +125,38 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
 }
 
 /// Splits early, into small tasks.
-HostBatch splitting(std::uint32_t room = 1 << 16) {
-  HostBatch batch(batch_solids(), room);
+HostBatch splitting(std::uint32_t capacity = 1 << 16) {
+  HostBatch batch(batch_solids(), capacity);
   batch.most_alone = 16;
   batch.task_weight = 4;
   return batch;
 }
 
-/// Splitting, and who does what in which order, must not show.
+/// Results must not depend on splitting, or on which team does what in which order.
 TEST(GpuQuery, SameBitsHoweverItIsSplit) {
   RandomPairs poses(4);
   const std::vector<BatchPair> pairs = poses.pairs(100);
   HostBatch roomy = splitting();
   const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched);
   EXPECT_GT(roomy.counters.tasks, 20u);
-  for (const std::uint32_t room : {0u, 30u, 300u}) {
-    HostBatch narrow = splitting(room);
+  for (const std::uint32_t capacity : {0u, 30u, 300u}) {
+    HostBatch narrow = splitting(capacity);
     expect_same_bits(narrow.run(pairs, Measure::matched), expected);
   }
 }
 
-/// Of few, within a factor of two; many keep their order.
+/// Few are sorted, within a factor of two; many keep their order.
 TEST(GpuQuery, TheLargestPairsBegin) {
   constexpr std::uint32_t kPairs = 1000;
   RandomPairs random(8);
   std::vector<std::uint32_t> meet(kPairs), list(gpu::kSizes * kPairs);
   for (std::uint32_t& m : meet) m = static_cast<std::uint32_t>(std::exp2(random.uniform(0, 8)));
-  for (const std::uint32_t room : {kPairs, 0u}) {
+  for (const std::uint32_t capacity : {kPairs, 0u}) {
     gpu::BatchCounters counters = {};
     gpu::BatchArrays batch = {};
     batch.counters = &counters;
     batch.list = list.data();
-    batch.size_capacity = room;
+    batch.size_capacity = capacity;
     for (std::uint32_t i = 0; i < kPairs; ++i) gpu::list_pair(batch, i, meet[i], counters.listed++);
     std::vector<bool> seen(kPairs);
     std::uint32_t least = 1u << gpu::kSizes;
@@ -165,7 +165,7 @@ TEST(GpuQuery, TheLargestPairsBegin) {
       ASSERT_LT(pair, kPairs);
       EXPECT_FALSE(seen[pair]);
       seen[pair] = true;
-      EXPECT_TRUE(room > 0 ? meet[pair] < 2 * least : pair == k);
+      EXPECT_TRUE(capacity > 0 ? meet[pair] < 2 * least : pair == k);
       least = std::min(least, meet[pair]);
     }
   }

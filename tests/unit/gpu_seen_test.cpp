@@ -9,7 +9,7 @@
 #include "query/ball_triangle/disc.h"
 #include "support/random_pairs.h"
 
-// Triangles as the GPU's queries see them, in floats: what they tell must hold exactly.
+// Triangles as the GPU's queries see them, in floats: their results must be exactly true.
 
 namespace ist::testing {
 namespace {
@@ -75,7 +75,7 @@ Vector3d closest_point(const Triangle& t, const Vector3d& x) {
   return within ? foot : best;
 }
 
-/// As all triangles are told to be flat.
+/// Tests all triangles as flat ones.
 bool is_flat(const double (&c)[3][3]) {
   double e[3], f[3];
   for (int k = 0; k < 3; ++k) {

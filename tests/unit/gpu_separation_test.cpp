@@ -158,14 +158,14 @@ TEST(GpuSeparation, OfTwinsTheNearerOrTheFirstAnswers) {
   expect_same_bits(batch.run(pairs, 1), answers);
 }
 
-/// Splitting, and who does what in which order, must not show.
+/// Results must not depend on splitting, or on which team does what in which order.
 TEST(GpuSeparation, SameBitsHoweverItIsSplit) {
   const std::vector<BatchPair> pairs = RandomPairs(23).pairs_at_all_distances(400);
   HostSeparations roomy(batch_solids());
   const std::vector<Separation> expected = roomy.run(pairs);
   EXPECT_GT(roomy.counters[0].tasks, 50u);
-  for (const std::uint32_t room : {0u, 30u, 300u}) {
-    HostSeparations narrow(batch_solids(), room);
+  for (const std::uint32_t capacity : {0u, 30u, 300u}) {
+    HostSeparations narrow(batch_solids(), capacity);
     expect_same_bits(narrow.run(pairs), expected);
   }
 }
@@ -180,7 +180,7 @@ TEST(GpuSeparation, LanesOfAWarpNeedNoLuck) {
   expect_same_bits(narrow.run(pairs, 3, {200}), roomy.run(pairs, 0, {200}));
 }
 
-/// What a limit leaves out may be as near as the interval says.
+/// Pairs that a limit leaves out may be as near as the interval states.
 TEST(GpuSeparation, IntervalsOfALimitHoldTheFinishedOnes) {
   const std::vector<BatchPair> pairs = RandomPairs(25).pairs_at_all_distances(300);
   const std::vector<Separation> finished = HostSeparations(batch_solids()).run(pairs);

@@ -7,8 +7,8 @@
 
 #include "support/temp_file.h"
 
-// No reader turns a file's axes, whatever a library below it does: a tetrahedron of 1 × 2 × 3 with
-// its right angle at the origin comes out as it is written in every format.
+// No reader rotates a file's axes, whatever the library below does: a tetrahedron of 1 × 2 × 3 with
+// its right angle at the origin is read as written in every format.
 
 namespace ist {
 namespace {
@@ -124,7 +124,7 @@ TEST(ImportAxes, AmfsUnitIsSaidToBeUnread) {
   expect_own_axes(mesh);
 }
 
-/// Vertices as they stand; the axis and the unit as they are declared.
+/// Vertices unchanged; the declared axis and unit.
 TEST(ImportAxes, FbxSaysWhichAxisIsUpAndItsUnit) {
   std::string fbx =
       "; FBX 7.4.0 project file\nFBXHeaderExtension:  {\n\tFBXHeaderVersion: 1003\n"

@@ -87,7 +87,7 @@ TEST(ReadGltf, NodesPlaceMeshesInDouble) {
   EXPECT_NEAR((mesh.vertices[7] - Eigen::Vector3d(20, 0, -2)).norm(), 0, 1e-14);  // mirrored in z
   const ClosedMesh closed = close_mesh(mesh, "a");
   EXPECT_NEAR(closed.report.volume, 2 * 8.0 / 6, 1e-13);
-  EXPECT_EQ(closed.report.flipped_components, 0u);  // the mirror's faces were turned on the way in
+  EXPECT_EQ(closed.report.flipped_components, 0u);  // the import turned the mirror's faces
 }
 
 TEST(ReadGltf, StripsAndFansWindAsTheyShould) {
@@ -188,7 +188,7 @@ TEST(ReadGltf, WeightsMorphAndNodesComeBeforeMeshes) {
   std::string buffer = tetrahedron_buffer();
   json document = with_more(tetrahedron(), buffer, raw<float>({0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 0}),
                             "VEC3", 5126, 4);
-  // A sparse target: vertex 3 goes up by 1.
+  // A sparse target: vertex 3 moves up by 1.
   document = with_more(document, buffer, raw<std::uint16_t>({3}), "SCALAR", 5123, 1);
   document = with_more(document, buffer, raw<float>({0, 0, 1}), "VEC3", 5126, 1);
   document["accessors"].push_back({{"componentType", 5126},
@@ -323,7 +323,7 @@ TEST(ReadGltf, DeepAndWideScenesEnd) {
   for (int i = 0; i < 20000; ++i) deep["nodes"].push_back({{"children", {i + 1}}});
   deep["nodes"].push_back({{"mesh", 0}});
   EXPECT_NEAR(volume_of(glb(deep)), 1.0 / 6, 1e-15);
-  // 200 kB that ask for 10^12 triangles.
+  // 200 kB that request 10^12 triangles.
   json wide = tetrahedron();
   wide["nodes"] = json::array();
   wide["meshes"][0]["primitives"] = json(2000, wide["meshes"][0]["primitives"][0]);

@@ -147,7 +147,7 @@ TEST(SharedMeshes, BrokenOnesRepairOrSayWhyNot) {
     try {
       const ClosedMesh mesh = close_mesh(load_mesh(path), path, OpenMeshPolicy::repair);
       EXPECT_FALSE(mesh.report.notes.empty());
-      // What comes out is closed: it passes unrepaired.
+      // The result is closed: it needs no repair.
       const ClosedMesh again = close_mesh(mesh.mesh, path);
       EXPECT_FALSE(again.report.repaired);
       EXPECT_NEAR(again.report.volume, mesh.report.volume, 1e-9 * mesh.report.volume);

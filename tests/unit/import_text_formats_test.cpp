@@ -34,7 +34,7 @@ std::string error_of(const std::string& name, const std::string& bytes) {
 #define EXPECT_ERROR(name, bytes, words) \
   EXPECT_NE(error_of(name, bytes).find(words), std::string::npos) << error_of(name, bytes)
 
-// A tetrahedron, in the corners that each format asks for.
+// A tetrahedron, with the corners that each format requires.
 const std::string kObj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
 const std::string kObjFaces = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 

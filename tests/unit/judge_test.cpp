@@ -20,7 +20,7 @@
 #include "mesh/samples/samples.h"
 #include "support/test_meshes.h"
 
-// What a repair is judged by, the judgement itself, and wraps.
+// The measures of a repair, its quality, and wraps.
 
 namespace ist {
 namespace {
@@ -112,7 +112,7 @@ TEST(SoupWinding, IsTheSolidAngleOfAnOpenSurface) {
 TEST(OutwardWinding, TurnsWhatFacesInward) {
   std::mt19937_64 random(3);
   for (const bool some : {false, true}) {
-    // A bowl, inside out or with triangles that face any way.
+    // A bowl, inside out or with triangles of random orientation.
     TriangleMesh bowl = cut_above(icosphere_mesh(3), 0.2);
     if (some)
       flip_some(bowl, random);
@@ -122,7 +122,7 @@ TEST(OutwardWinding, TurnsWhatFacesInward) {
     EXPECT_GT(winding.at({0, 0, -0.5}), 0.7);
     EXPECT_LT(winding.at({0, 0, -1.5}), 0.1);
   }
-  // Triangles that share no edge: only what is seen of them tells.
+  // Triangles that share no edge: only their visibility decides.
   TriangleMesh apart;
   for (const auto& t : icosphere_mesh(2).triangles) {
     for (const auto v : t) apart.vertices.push_back(1.001 * icosphere_mesh(2).vertices[v]);
@@ -178,7 +178,7 @@ TEST(Judge, ConfidenceFallsAsTheHoleGrows) {
     const double confidence = closed.report.judged.value().confidence;
     EXPECT_LT(confidence, last) << z;
     last = confidence;
-    // What a ball lost is at most three times what confidence lacks.
+    // The loss of a ball is at most three times the missing confidence.
     EXPECT_LT(1 - volume_of(closed) / volume_of(close_mesh(icosphere_mesh(3), "whole")),
               3 * (1 - confidence) * (1 - confidence) + 1.4 * (1 - confidence));
   }
@@ -232,7 +232,7 @@ TEST(Judge, TellsHowFarWhatWasAddedLies) {
   }
 }
 
-/// What was made lacks one of two equal boxes, which lie flush, a corner on a corner, or apart.
+/// The result lacks one of two equal boxes, which lie flush, corner on corner, or apart.
 TEST(Judge, CountsVolumeThatWasNotMade) {
   const TriangleMesh box = box_mesh({-1, -1, -1}, {1, 1, 1});
   const ClosedMesh made = close_mesh(box, "box");

@@ -14,7 +14,7 @@
 #include <ist/asset_layout.h>
 #include "support/test_meshes.h"
 
-// The mesh that an asset holds for exact queries, and assets of a mesh alone.
+// The mesh that an asset stores for exact queries, and mesh-only assets.
 
 namespace ist {
 namespace {
@@ -56,7 +56,7 @@ TEST(KeptMesh, IsAllOfTheMeshsOwnTriangles) {
   }
 }
 
-// Where the map into the unit frame is exact nothing was rounded; elsewhere the bound is tight.
+// If the map into the unit frame is exact, nothing was rounded; otherwise the bound is tight.
 /// More than 256 blocks share the tip of a cone: they do not all name each other.
 TEST(KeptMesh, OfALargeFanGrowsWithItsTriangles) {
   constexpr std::uint32_t kSides = 9000;
@@ -73,7 +73,7 @@ TEST(KeptMesh, OfALargeFanGrowsWithItsTriangles) {
   const Asset asset = bake_mesh_only(mesh);
   expect_sound(asset, mesh);
   EXPECT_LT(asset.bytes().size(), 100u * 2 * kSides);
-  // Half a cone and, of the other half, what a box leaves.
+  // Half a cone, and the part of the other half outside a box.
   const Asset box = bake_mesh_only(closed(testing::box_mesh({-2, -2, -2}, {0, 2, 2}), "box"));
   const Asset other = bake_mesh_only(closed(testing::box_mesh({0, -2, -2}, {2, 2, 2}), "box"));
   PenetrationSettings exact;
@@ -126,7 +126,7 @@ TEST(KeptMesh, OfWhatCountsVolumeTwiceIsResolved) {
       EXPECT_EQ(found.violations, 0u) << found.name;
   }
   EXPECT_NEAR(bake(nested, few_spheres()).view().self_overlap_volume(), 1, 1e-6);
-  // Of parts that touch the wall between them goes; cavities are as they should be.
+  // The wall between touching parts is removed; cavities stay correct.
   const ClosedMesh touching =
       closed(testing::joined(testing::box_mesh(-one, one),
                              testing::box_mesh(Point(1, -0.5, -0.5), Point(2, 0.5, 0.5))),

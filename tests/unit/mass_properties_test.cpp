@@ -52,7 +52,7 @@ struct Reference {
   }
 };
 
-/// By the divergence theorem in another form, ∫ x² = ∮ x³/3 n_x and so on, over each triangle by
+/// Another form of the divergence theorem, ∫ x² = ∮ x³/3 n_x and so on, over each triangle by
 /// quadrature that is exact for cubic functions.
 Reference by_quadrature(const TriangleMesh& mesh) {
   using Point = std::array<long double, 3>;
@@ -143,7 +143,7 @@ TEST(MassProperties, OfBoxesInClosedForm) {
   }
 }
 
-/// Rounding does not grow with the triangles, nor with what is hollow.
+/// Rounding does not grow with the triangles, nor with cavities.
 TEST(MassProperties, OfPolyhedraByAnotherFormula) {
   TriangleMesh off_centre = testing::torus_mesh(2, 0.5, 120, 60);
   const Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
@@ -190,7 +190,7 @@ TEST(MassProperties, OffsetsAndSizesDoNotMatter) {
     }
 }
 
-/// What shells share counts once, as it does in the volume.
+/// Volume shared by shells counts once, as in the volume.
 TEST(MassProperties, OfSolidsThatMeetThemselves) {
   const Vector3d zero = Vector3d::Zero(), one = Vector3d::Ones(), half = one / 2;
   Reference two = of_box(-half, half);

@@ -23,7 +23,7 @@ float clearance(const std::vector<Ball>& balls, Float3 x) {
   return least;
 }
 
-/// Balls about the origin, some of which may hold it.
+/// Balls about the origin, some of which may contain it.
 std::vector<Ball> random_balls(std::mt19937& random, int count, float scale) {
   std::uniform_real_distribution<float> unit(-1, 1);
   std::vector<Ball> balls;

@@ -100,7 +100,7 @@ void expect_same(const std::vector<Sphere>& a, const std::vector<Sphere>& b) {
 
 ClosedMesh sample_mesh(const char* name) { return close_mesh(make_sample(name), name); }
 
-/// A cube: most of what is compared in it is equal.
+/// A cube: most comparisons in it are ties.
 ClosedMesh cube_mesh() {
   ClosedMesh cube;
   cube.name = "cube";
@@ -131,9 +131,9 @@ TEST(PackingOrder, AnotherHierarchyGivesTheSameSpheres) {
   }
 }
 
-/// Cells on random ways down the octree, worked on by one thread and by a team of lanes.
+/// Cells on random descents of the octree, processed by one thread and by a team of lanes.
 template <int Width>
-void expect_team_agrees(const char* name, int ways, unsigned seed) {
+void expect_team_agrees(const char* name, int descents, unsigned seed) {
   const MeshSolid solid(sample_mesh(name));
   const ist::testing::HostWideTree wide(solid.view());
   const WideMeshSurface surface(wide.tree());
@@ -147,7 +147,7 @@ void expect_team_agrees(const char* name, int ways, unsigned seed) {
   std::mt19937 random(seed);
   ist::testing::Fibers<Width> fibers(seed);
   int states[3] = {};  // of settled, candidate, split
-  for (int way = 0; way < ways; ++way) {
+  for (int descent = 0; descent < descents; ++descent) {
     StoredCell<std::uint32_t> stored{};
     stored.cell.inside = surface.inside(one, stored.cell.centre);
     for (int level = 0; level < 9; ++level) {
@@ -182,8 +182,8 @@ void expect_team_agrees(const char* name, int ways, unsigned seed) {
         return std::memcmp(&a.cell, &b.cell, sizeof a.cell) == 0 &&
                std::memcmp(a.ring, b.ring, ring(a)) == 0;
       };
-      ASSERT_TRUE(same(stored, other)) << "way " << way << " level " << level;
-      ASSERT_TRUE(same(child, other_child)) << "way " << way << " level " << level;
+      ASSERT_TRUE(same(stored, other)) << "descent " << descent << " level " << level;
+      ASSERT_TRUE(same(child, other_child)) << "descent " << descent << " level " << level;
       stored = child;
     }
   }
@@ -196,7 +196,7 @@ TEST(PackingOrder, ATeamOfLanesDoesWhatOneThreadDoes) {
 }
 
 TEST(PackingOrder, AFullSampleKeepsTheNearestOfAnyOrder) {
-  // More spheres within the window than there is room for.
+  // More spheres within the window than fit.
   std::mt19937 random(3);
   std::uniform_real_distribution<float> unit(-1, 1);
   for (int round = 0; round < 20; ++round) {

@@ -7,7 +7,7 @@
 namespace ist {
 namespace {
 
-/// A cache whose blocks know their number, which stands in for where they are.
+/// A cache whose blocks know their number, which replaces their position.
 class Cache {
  public:
   Cache() { cache_->forget(); }

@@ -162,7 +162,7 @@ TEST(Polygonise, SizesAndOffsetsDoNotMatter) {
     }
 }
 
-/// Solids that no grid of so few cells can tell: closed all the same, and the error says so.
+/// Solids that so few cells cannot resolve: still closed, and the error shows it.
 TEST(Polygonise, WhatIsTooThinCountsIntoTheError) {
   const auto thin = ist::make_union(ist::make_ball({0, 0, 0}, 0.3),
                                     ist::make_box({0.5, 0, 0.01}, {0.5, 0.2, 0.002}));

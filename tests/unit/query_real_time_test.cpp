@@ -1,4 +1,4 @@
-// Nothing inside a query may wait: every way to the heap, to a lock and to the system is trapped
+// Nothing inside a query may wait: every path to the heap, to a lock and to the system is trapped
 // while queries of all kinds run, and every trap is shown to spring.
 #include <gtest/gtest.h>
 #include <ist/bake.h>
@@ -50,7 +50,7 @@ class RealTime : public ::testing::Test {
     if (ist_query(&c_a, &c_b, nullptr, nullptr, &c_workspace_, &c_penetration, &c_separation) < 0)
       ADD_FAILURE() << ist_describe(c_penetration.status);
 
-    // What meets a surface: a field and a tree, and trees by the surface of either.
+    // Queries of a surface: a field and a tree, and trees by the surface of either.
     const PlacedShape field{fields_[static_cast<std::size_t>(i) % fields_.size()], poses_a_[i], 1};
     volume_[i] += penetration(field, b, settings, workspaces_[0]).volume;
     query(field, b, testing::for_both(settings), workspaces_[0]);
@@ -69,7 +69,7 @@ class RealTime : public ::testing::Test {
     time_of_impact(field, b, motions, until, workspaces_[0]);
     const PlacedAsset solid{box_.view(), poses_a_[i], 1.0};
     const PlacedAsset other{box_.view(), poses_b_[(i + 20) % kPoses], 1.0};
-    // By meshes: across, in place, and in little room.
+    // Queries of meshes: across, in place, and with little memory.
     PenetrationSettings exact = settings;
     exact.measure = Measure::exact;
     const PlacedAsset ball{ball_.view(), poses_b_[i], 1.0};
@@ -154,7 +154,7 @@ class RealTime : public ::testing::Test {
   ~RealTime() override { ist_workspace_release(&c_workspace_); }
 };
 
-// The first one, so that a process's first query is among what it looks at.
+// The first one, so that it covers a process's first query.
 TEST_F(RealTime, QueriesMakeNoSystemCall) {
   if (!testing::kTrapsWork) GTEST_SKIP() << "the sanitizer owns the traps";
   const auto all = [&] {

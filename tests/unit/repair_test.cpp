@@ -48,7 +48,7 @@ TEST(Repair, HolesAreCapped) {
   EXPECT_EQ(repaired(tube).report.filled_holes, 4u);
 }
 
-/// Boxes side by side, whose walls in common are there once, facing any way.
+/// Boxes side by side, whose common walls exist once, with any orientation.
 TEST(Repair, LayersLoseTheirInnerWallsAndKeepTheirOutside) {
   std::mt19937_64 random(5);
   for (const std::array<int, 3>& cells : {std::array{2, 1, 1}, {4, 1, 1}, {2, 2, 1}, {3, 2, 2}})

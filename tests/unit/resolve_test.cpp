@@ -50,7 +50,7 @@ void expect_resolved(const TriangleMesh& mesh, const double volume, const double
   EXPECT_LE(again.counted_twice + again.counted_against, 1e-14 * report.bounds.volume());
 }
 
-/// Inside of the one is inside of the other, but for what is as near the surface as `near`.
+/// Inside one means inside the other, except within `near` of the surface.
 void expect_same_solid(const ClosedMesh& a, const ClosedMesh& b, const double near) {
   const auto of_a = make_solid(a), of_b = make_solid(b);
   std::mt19937_64 random(3);
@@ -119,7 +119,7 @@ TriangleMesh prism(const std::uint32_t n, const double low, const double high, c
   return mesh;
 }
 
-/// What a prism fits into; its outer radius is 2.
+/// A cavity that a prism fits into; its outer radius is 2.
 TriangleMesh tube(const std::uint32_t n, const double low, const double high) {
   TriangleMesh mesh;
   mesh.vertices = joined(prism(n, low, high, 0), prism(n, low, high, 0)).vertices;
@@ -390,7 +390,7 @@ TEST(Resolve, SameBytesForAnyNumberOfThreads) {
   }
 }
 
-/// A hundred thousand pairs: told of on the caller's thread, and ended where it is told to.
+/// A hundred thousand pairs: reported on the caller's thread, and stopped on request.
 TEST(Resolve, ReportsAndIsCancelled) {
   const ClosedMesh closed = balls(26, 3);
   ASSERT_GT(closed.meeting_pairs->size(), 35'000u);
@@ -425,7 +425,7 @@ TEST(Resolve, ReportsAndIsCancelled) {
   EXPECT_THROW(bake(closed, {.max_spheres = 100}, no), Error);
   EXPECT_THROW(bake_mesh_only(closed, 0, no), Error);
   EXPECT_THROW(bake_to_error(closed, {}, {}, no), Error);
-  // What meets nothing is not looked at.
+  // Parts that meet nothing are skipped.
   EXPECT_EQ(resolve(close_mesh(testing::cube_mesh(), "cube"), no).resolution.how, How::as_it_is);
 }
 
@@ -469,7 +469,7 @@ TEST(Resolve, WhatResolvedPairsShareIsTheOraclesVolume) {
   for (std::size_t i = 0; i < poses.size(); i += 3) {
     const auto number = [&](const char* name) { return std::stod(poses[i].at(name)); };
     const std::string &a = poses[i].at("meshA"), &b = poses[i].at("meshB");
-    // The oracle's reader of .dae files goes through float.
+    // The oracle's reader of .dae files uses float.
     if ((a + b).find(".dae") != std::string::npos) continue;
     TriangleMesh placed = resolve(wild_mesh(b)).mesh.mesh;
     const Eigen::Matrix3d turn =

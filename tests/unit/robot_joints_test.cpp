@@ -13,7 +13,7 @@
 #include "robots/description/self_collision.h"
 #include "support/temp_file.h"
 
-// Joints, and what a planner is told about links that touch each other.
+// Joints, and the planner's data about links that touch each other.
 
 namespace ist::testing {
 namespace {
@@ -198,7 +198,7 @@ TEST(SelfCollision, FalseMeetingsAreOfSpheresWhileNoSolidsOverlap) {
     EXPECT_FALSE(balls(thin.spheres, 0.15)(one.a, one.b, one.b_in_a));
     samples.insert(one.sample);
   }
-  // As many free poses are called colliding as in those that measure, about.
+  // About as many free poses are called colliding as in the measuring ones.
   EXPECT_GT(self.free, self.samples / 2);
   EXPECT_LT(self.free, self.samples);
   EXPECT_NEAR(static_cast<double>(samples.size()) / static_cast<double>(self.free),
@@ -257,7 +257,8 @@ TEST(SelfCollision, TheDefaultPoseIsFree) {
   EXPECT_EQ(self.pose.from, "given");
   EXPECT_EQ(self.pose.positions, (Positions{2, 0}));
 
-  // What is given is kept, and the rest searched: they overlap with the other at 0 or the middle.
+  // Given positions are kept, and the rest searched: they overlap with the other at 0 or the
+  // middle.
   wanted.positions[0] = -0.8;
   self = study(robot.robot, robot.links, 0.45, wanted);
   EXPECT_EQ(self.pose.from, "search");
@@ -268,7 +269,7 @@ TEST(SelfCollision, TheDefaultPoseIsFree) {
   wanted.positions.clear();
   EXPECT_EQ(study(robot.robot, robot.links, 0.45, wanted).pose.from, "ready");
 
-  // Nothing is free: that is told.
+  // No pose is free: this is reported.
   wanted.states.clear();
   wanted.positions = {{0, 0}, {1, 0}};
   self = study(robot.robot, robot.links, 0.45, wanted);

@@ -110,7 +110,7 @@ TEST(RobotModel, FindsPackagesAndTurnsMirroredMeshes) {
   EXPECT_EQ(make_solid(closed)->bounds().min().x(), 3);
 }
 
-/// What public robots hold.
+/// The contents of public robots.
 TEST(RobotModel, UnusedFaultsAndUnusualNames) {
   const RobotModel robot = model_of(
       "<robot name='r'><link name='a'><visual><geometry><box size='0 0 0'/></geometry></visual>"

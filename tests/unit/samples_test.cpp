@@ -67,8 +67,8 @@ TEST(Samples, AnUnknownNameListsTheNamesThereAre) {
   }
 }
 
-/// Largest depth at which a corner of the nut, turned and moved along z, lies in the bolt, and the
-/// other way round; negative where they keep a distance.
+/// Largest depth at which a corner of the nut, turned and moved along z, lies in the bolt, or one
+/// of the bolt in the nut; negative if they keep a distance.
 double deepest_corner(double turns, double along) {
   const ist::TriangleMesh bolt = ist::make_sample("bolt"), nut = ist::make_sample("nut");
   const auto bolt_solid = ist::make_solid(ist::close_mesh(bolt, "bolt"));

@@ -21,7 +21,7 @@ namespace {
 
 using Pairs = std::vector<std::array<std::uint32_t, 2>>;
 
-/// By the exact test of every pair; what is said without it must agree.
+/// Exact test of every pair; results without it must agree.
 Pairs all_pairs(const TriangleMesh& mesh) {
   const auto& [vertices, triangles, declared, notes] = mesh;
   const std::vector<std::uint32_t> spread = spread_fans(vertices, triangles);
@@ -51,7 +51,7 @@ void expect_all_found(const TriangleMesh& mesh) {
     EXPECT_EQ(found->count, pairs.size());
     EXPECT_EQ(*found->pairs, pairs);
   }
-  // Where it is known of many that they do not meet each other.
+  // Many are known not to meet each other.
   std::vector<std::uint8_t> apart(mesh.triangles.size(), 1);
   for (const auto& [a, b] : pairs)
     if (apart[a] != 0) apart[b] = 0;
@@ -60,7 +60,7 @@ void expect_all_found(const TriangleMesh& mesh) {
   EXPECT_EQ(*found->pairs, pairs);
 }
 
-/// What is added to a large mesh is looked for nearby alone.
+/// Intersections of an addition to a large mesh are searched only nearby.
 TEST(SelfIntersections, OfFewAddedTriangles) {
   TriangleMesh mesh = torus_mesh(2, 0.7, 60, 30);
   std::vector<std::uint8_t> apart(mesh.triangles.size(), 1);
@@ -259,7 +259,7 @@ TEST(SelfIntersections, OfNeedles) {
   const TriangleMesh two = testing::joined(testing::needle_tube(60, 0.5), other);
   expect_all_found(two);
   EXPECT_GT(find_self_intersections(two.vertices, two.triangles)->count, 100u);
-  // By their boxes along the axes, more pairs meet than are looked at.
+  // More pairs of axis-aligned boxes meet than are examined.
   const TriangleMesh large = testing::needle_tube(10'000, 0.3);
   const auto none = find_self_intersections(large.vertices, large.triangles);
   ASSERT_TRUE(none);

@@ -26,7 +26,7 @@ std::vector<Sphere> random_spheres(std::size_t n, unsigned seed) {
 
 class TreeOfCount : public ::testing::TestWithParam<std::size_t> {};
 
-// Every node's ball holds every sphere and cover ball below it, in double, for any count.
+// Every node's ball contains every sphere and cover ball below it, in double, for any count.
 TEST_P(TreeOfCount, BallsHoldWhatIsBelow) {
   const std::size_t n = GetParam();
   const auto spheres = random_spheres(n, static_cast<unsigned>(n));

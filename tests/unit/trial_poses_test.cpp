@@ -103,7 +103,7 @@ TEST(BakeToError, RefusesSenseless) {
   EXPECT_THROW(bake_to_error(baked_cube().mesh, {0.01, 0.9}), Error);
 }
 
-// Where the most is not enough, all of it is taken.
+// If the maximum is not enough, all of it is taken.
 TEST(BakeToError, StopsAtTheMostThatIsAllowed) {
   const Asset asset = bake_to_error(baked_cube().mesh, {0.01, 0.001}, {.max_spheres = 80}).asset;
   EXPECT_EQ(asset.view().sphere_count(), 80u);

@@ -55,7 +55,7 @@ export interface Pose {
 export type SphereMeasure = 'matched' | 'inner';
 
 /**
- * What represents the solid: a set of spheres, or its mesh. `exact`: the true volume and its
+ * The representation of the solid: a set of spheres, or its mesh. `exact`: the true volume and its
  * gradients, for two assets that both store their mesh (AssetInfo.meshTriangles > 0). `matched` goes
  * over to it where the spheres are too coarse for the contact of two solids of unlike sizes that
  * both store theirs (ContactOptions.spheresOnly).
@@ -463,8 +463,8 @@ export interface RayHits {
 }
 
 /**
- * Where rays first meet the surface of a solid at `pose`, on their way out if they start inside. No
- * ray passes between two triangles. Directions may have any length but 0. One origin or one direction
+ * The points where rays first meet the surface of a solid at `pose`; rays that start inside meet it
+ * from within. No ray passes between two triangles. Directions may have any length but 0. One origin or one direction
  * applies to all rays. Shapes: half-spaces, boxes, balls, capsules and cylinders.
  * `maxDistance` [u]: rays end there; default Infinity.
  */
@@ -519,7 +519,7 @@ export interface ScenePair {
   begins: boolean;
   /** Where the rule is 'overlap'; else 'unknown'. */
   overlapping: 'no' | 'yes' | 'unknown';
-  /** Zero where the rule asks none. */
+  /** Zero if the rule requests none. */
   penetration: Penetration;
   /** Zero where the bodies overlap, or the rule has no margin. */
   separation: Separation;
@@ -538,9 +538,9 @@ export interface SceneStep {
 }
 
 /**
- * Many solids, and which of them meet. A step asks the pairs whose boxes meet and of which a body was
- * added or moved; of the others the answers are those of the step before. Poses and rules alone decide
- * the answers. Each Scene has a workspace of its own: 42 MB.
+ * Many solids, and which of them meet. A step queries the pairs whose boxes meet and one of whose
+ * bodies was added or moved; the others keep the answers of the step before. Poses and rules alone
+ * decide the answers. Each Scene has a workspace of its own: 42 MB.
  */
 export class Scene {
   /** Memory for as many bodies, and pairs whose boxes meet, is taken at once: 1024 and 8192. */
@@ -549,7 +549,7 @@ export class Scene {
   readonly size: number;
   /**
    * Adds a body at a pose; undefined: at the origin. Returns its number: the one given, or the first
-   * above all others. Two bodies that do not move are not asked, nor are two shapes. `group` (< 8)
+   * above all others. Two bodies that do not move are not queried, nor are two shapes. `group` (< 8)
    * selects the rule of a pair; each of a pair must be on a layer (bits) that the other meets.
    */
   add(
@@ -562,8 +562,8 @@ export class Scene {
   /** Of bodies numbers[i]; scales are those they were added with. */
   setPoses(numbers: ArrayLike<number>, poses: ArrayLike<Pose>): void;
   /**
-   * How bodies of two groups are asked, whichever is which. `margin` [u]: bodies that come as near
-   * are told too, with their separation.
+   * The rule for bodies of two groups, whichever is which. `margin` [u]: bodies within this distance
+   * are reported too, with their separation.
    */
   setRule(
     groupA: number,
@@ -576,7 +576,7 @@ export class Scene {
   /** Bodies that are joined do not meet, until include(). */
   exclude(a: number, b: number): void;
   include(a: number, b: number): void;
-  /** Asks all pairs that may have changed. */
+  /** Queries all pairs that may have changed. */
   step(options?: { into?: SceneStep }): SceneStep;
   /** As raycast(), of the first body that each ray meets: `number`, 0 without a hit. */
   raycast(

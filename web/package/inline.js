@@ -1,4 +1,4 @@
-// Writes dist/inlined.js: dist/ist.wasm as text in a module, for src/compat.js.
+// Writes dist/inlined.js, a module that contains dist/ist.wasm as text, for src/compat.js.
 import {readFile, writeFile} from 'node:fs/promises';
 
 const bytes = await readFile(new URL('dist/ist.wasm', import.meta.url));

@@ -1,5 +1,4 @@
-// Bakes what the page shows and bundles it: node build.js. The folder it leaves wants no server's
-// logic.
+// Bakes the page's data and bundles it: node build.js. Any static server can serve the folder.
 
 import {copyFileSync, mkdirSync} from 'node:fs';
 import {join} from 'node:path';
@@ -12,7 +11,7 @@ import {bakeDemo, demoFolder} from './demo.js';
 
 export const siteFolder = join(buildFolder, 'playground/site');
 
-/** What the page links to; text, which every browser displays. */
+/** Linked documents, as text, which every browser displays. */
 const kAbout = {'guide.txt': 'docs/user_guide.md', 'web.txt': 'docs/web.md', 'licence.txt': 'LICENSE'};
 
 export async function buildSite() {

@@ -7,7 +7,7 @@ import {join} from 'node:path';
 
 import {baked, buildFolder, hasOracle, oracleMesh, root, sampleMesh, sharedMesh} from '../package/test/data.js';
 
-/** Beside assets: what the page fetches. */
+/** The folder that the page fetches from. */
 export const demoFolder = join(buildFolder, 'playground/public');
 export const sphereCounts = [4000, 10000];
 

@@ -9,14 +9,14 @@
 
 namespace ist::gpu {
 
-/// First sizes of a packing's arrays; what turns out too small is enlarged.
+/// Initial sizes of a packing's arrays, which grow when they are too small.
 struct BandedSizes {
   std::uint32_t cells, candidates, spheres, cell_blocks, pairs;
   std::uint64_t words;
 };
 
-/// For so many spheres (0 = no limit). Enough for most meshes: what `dino` and `dragon_871k` take,
-/// and some.
+/// The sizes for a maximum number of spheres (0 = no limit). They suffice for most meshes: they
+/// exceed the needs of `dino` and `dragon_871k`.
 inline BandedSizes banded_sizes(std::uint64_t max_spheres) {
   const std::uint64_t n = max_spheres > 0 ? std::min<std::uint64_t>(max_spheres, 1u << 20) : 10000;
   const auto size = [](std::uint64_t x) { return static_cast<std::uint32_t>(x); };
@@ -28,8 +28,8 @@ inline BandedSizes banded_sizes(std::uint64_t max_spheres) {
           (1u << 20) + 300 * n};
 }
 
-/// The arrays of one banded packing. Array<T> is a DeviceArray or, for tests, one of the host;
-/// Place is what it is made from.
+/// The arrays of one banded packing. Array<T> is a DeviceArray or, for tests, an array of the host;
+/// Place is the argument of its constructor.
 template <template <class> class Array, class Place>
 class BandedBuffers {
  public:
@@ -89,7 +89,8 @@ class BandedBuffers {
 
   BandedState state() const { return state_.to_host(1)[0]; }
 
-  /// Makes larger what stopped the coop, so that it can go on. `state` is the present one.
+  /// Enlarges the arrays that stopped the launch, so that it can continue. `state` is the present
+  /// one.
   void provide(BandedState state) {
     switch (state.need) {
       case Need::nothing:

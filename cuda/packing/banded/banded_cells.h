@@ -5,15 +5,14 @@
 #include "cuda/packing/banded/banded_state.h"
 #include "packing/banded/prototype.h"
 
-// The steps of a band that deal with cells (BandedPacker on the CPU). Every one is written for a
-// coop; `a` are the arrays, `s` = *a.state. What depends on an order of threads is only where in an
-// array a thing stands.
+// The steps of a band that process cells (BandedPacker on the CPU). Each is written for a launch;
+// `a` are the arrays, `s` = *a.state. The order of threads affects only positions in arrays.
 
 namespace ist::gpu {
 
 using packing::CellState;
 
-/// Stores what is known of a cell, in both places.
+/// Stores a cell and its bound, each in its array.
 template <class Team, class Scratch>
 IST_HD void put_cell(const Team& team, const BandedArrays& a, const packing::Cell& cell,
                      const Scratch& scratch, std::uint32_t slot) {
@@ -21,7 +20,7 @@ IST_HD void put_cell(const Team& team, const BandedArrays& a, const packing::Cel
   if (team.lane() == 0) a.bounds[slot] = cell.bound;
 }
 
-/// Begins with the root cell alone; spheres and grid stay.
+/// Begins with the root cell alone; spheres and grid are kept.
 template <class CoopLaunch, class Surface>
 IST_HD void plant_root(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
@@ -67,7 +66,7 @@ IST_HD void sweep_cells(CoopLaunch& coop, const BandedArrays& a) {
   }
 }
 
-/// The cells that reach the margin become the frontier.
+/// Makes the cells that reach the margin the frontier.
 template <class CoopLaunch>
 IST_HD void activate_cells(CoopLaunch& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
@@ -80,15 +79,15 @@ IST_HD void activate_cells(CoopLaunch& coop, const BandedArrays& a) {
   });
 }
 
-/// Where a kept child goes.
+/// Takes a slot for a kept child.
 IST_HD inline std::uint32_t take_slot(const BandedArrays& a) {
   BandedState& s = *a.state;
   const std::uint32_t taken = atomic_add(&s.free_taken, 1);
   return taken < s.free ? a.free_list[taken % a.cell_capacity] : atomic_add(&s.slots, 1);
 }
 
-/// A stored cell that another team may have written in this step: past the first-level cache. What
-/// orders the loads after the one of the cell's number is that they depend on it.
+/// Loads a stored cell that another team may have written in this step, so it bypasses the
+/// first-level cache. The loads depend on the cell's number, which orders them after it.
 template <class Team>
 IST_HD packing::Cell load_fresh_cell(const Team& team, const BandedArrays::Cell& from,
                                      packing::CellScratch<std::uint32_t>& scratch) {
@@ -106,7 +105,7 @@ IST_HD packing::Cell load_fresh_cell(const Team& team, const BandedArrays::Cell&
   return cell;
 }
 
-/// A child in the queue of those that a step makes and works on beside its frontier.
+/// A child in the queue of children that a step creates and processes beside its frontier.
 struct ChildCode {
   std::uint32_t parent, depth, octant;
 
@@ -115,7 +114,7 @@ struct ChildCode {
   IST_HD std::uint32_t code() const { return parent << 5 | depth << 3 | octant; }
 };
 
-/// Queues a cell's children and frees its slot, for later steps. `pending` then counts them instead
+/// Queues a cell's children and frees its slot for later steps. `pending` then counts them instead
 /// of the cell.
 template <class Team>
 IST_HD void queue_children(const Team& team, const BandedArrays& a, ChildCode first) {
@@ -136,13 +135,14 @@ IST_HD void queue_children(const Team& team, const BandedArrays& a, ChildCode fi
   }
 }
 
-/// Waits for the entry of the queue that is this team's; kNone if none will come.
+/// Waits for this team's entry of the queue; kNone if none will come.
 template <class CoopLaunch>
 IST_HD std::uint32_t wait_for_child(const CoopLaunch& coop, const BandedArrays& a,
                                     std::uint32_t place) {
   std::uint32_t code = ChildCode::kNone;
   if (coop.team().lane() == 0 && place < a.queue_capacity) {
-    // `pending` is one word for all teams: read seldom, so as not to delay those that count in it.
+    // `pending` is one word for all teams. It is read rarely, so as not to delay teams that update
+    // it.
     constexpr std::uint32_t kSeldom = 8;
     for (std::uint32_t looks = 1; (code = atomic_load(&a.queue[place])) == ChildCode::kNone;
          ++looks) {
@@ -154,15 +154,15 @@ IST_HD std::uint32_t wait_for_child(const CoopLaunch& coop, const BandedArrays& 
   return coop.team().broadcast(code, 0);
 }
 
-/// Notes the largest radius and bound, in bits, of cells that have candidates.
+/// Records the largest radius and bound, as bits, of cells that have candidates.
 IST_HD inline void note_candidates(BandedState& s, std::uint32_t radius, std::uint32_t bound) {
   atomic_max(&s.largest_radius, radius);
   atomic_max(&s.largest_bound, bound);
 }
 
-/// The first part of the work on the frontier's cells of one class, a lane a cell: what the spheres
-/// and the remembered triangles tell has little to share among lanes. Where the bound is attained
-/// is kept in place of the prototype, which an open cell does not have.
+/// The first part of the work on the frontier's cells of one class, one lane a cell: the bounds by
+/// spheres and by remembered triangles offer little to share among lanes. The point where the bound
+/// is attained is kept in place of the prototype, which an open cell does not have.
 template <class CoopLaunch, class Surface>
 IST_HD void refresh_cells(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
@@ -207,12 +207,12 @@ IST_HD void refresh_cells(CoopLaunch& coop, const BandedArrays& a, const Surface
   if (team.lane() == 0 && radius > 0) note_candidates(s, radius, bound);
 }
 
-/// Notes a cell that is to be split in the step that splits.
+/// Records that a cell is to be split in the split step.
 IST_HD inline void note_splitting(const BandedArrays& a, std::uint32_t slot) {
   a.splitting[atomic_add(&a.state->splitting, 1)] = slot | 0xFFu << BandedArrays::kCellBits;
 }
 
-/// The second part, of the cells that the first left open.
+/// The second part, for the cells that the first part left open.
 template <class CoopLaunch, class Surface>
 IST_HD void confine_cells(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
@@ -233,10 +233,10 @@ IST_HD void confine_cells(CoopLaunch& coop, const BandedArrays& a, const Surface
   });
 }
 
-/// Works on the frontier's cells of one class, or does the last part of the work on those that are
-/// still open. Where the schedule says that no rule can come between (state.depth), cells that are
-/// to be split are split in the same step, and so on for that many levels: a chain of splits then
-/// waits for itself alone.
+/// Processes the frontier's cells of one class, or the last part of the work on those that are
+/// still open. If no rule of the schedule can apply in between (state.depth), cells that are to be
+/// split are split in the same step, and so on for that many levels: then a chain of splits waits
+/// for itself alone.
 template <class CoopLaunch, class Surface>
 IST_HD void work_on_cells(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;

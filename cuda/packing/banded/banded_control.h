@@ -13,9 +13,9 @@ IST_HD inline void to_sweep(BandedState& s) {
   s.step = Step::sweep;
 }
 
-/// Work on the frontier's cells of one class. Many cells are worked on in parts, each a step: the
-/// first by a lane a cell, and then all teams run the same little code. Few are done with in one
-/// step, whose end one has to wait for.
+/// Starts work on the frontier's cells of one class. Many cells are processed in parts, each a
+/// step, the first by one lane a cell, so that all teams run the same small code. A few cells are
+/// finished in one step, since each step ends with a barrier.
 IST_HD inline void to_class(const BandedArrays& a) {
   BandedState& s = *a.state;
   s.in_parts = s.frontier >= a.many;
@@ -23,8 +23,8 @@ IST_HD inline void to_class(const BandedArrays& a) {
   s.step = s.in_parts ? Step::refresh : Step::work;
 }
 
-/// Work on the frontier. As many levels are done at once as surely meet none of the rules that the
-/// schedule has between levels, even if every cell is split.
+/// Starts work on the frontier. It covers as many levels as certainly trigger none of the
+/// schedule's rules between levels, even if every cell is split.
 IST_HD inline void to_work(const BandedArrays& a) {
   constexpr std::uint32_t kDeepest = 3;
   BandedState& s = *a.state;
@@ -33,15 +33,15 @@ IST_HD inline void to_work(const BandedArrays& a) {
   s.cell_class = 0;
   s.depth = 0;
   const std::uint64_t plateau = s.schedule.plateau();
-  const std::uint64_t room = std::uint64_t{a.cell_capacity} - s.slots +
-                             (s.free > s.free_taken ? s.free - s.free_taken : 0);
+  const std::uint64_t free_slots = std::uint64_t{a.cell_capacity} - s.slots +
+                                   (s.free > s.free_taken ? s.free - s.free_taken : 0);
   std::uint64_t cells = s.frontier, level = s.frontier;
   while (s.classes == 1 && s.depth < kDeepest) {
     level *= 8;
     cells += level;
     const std::uint64_t children = cells - s.frontier;
     if (s.active + cells > plateau || s.live + children > packing::BandSchedule::kMostCells ||
-        children > room || children > a.queue_capacity)
+        children > free_slots || children > a.queue_capacity)
       break;
     ++s.depth;
   }
@@ -50,7 +50,7 @@ IST_HD inline void to_work(const BandedArrays& a) {
   to_class(a);
 }
 
-/// The next round of the band, or the next band.
+/// Begins the next round of the band, or the next band.
 IST_HD inline void to_round(const BandedArrays& a) {
   BandedState& s = *a.state;
   if (s.frontier == 0 || s.schedule.stopped) {
@@ -88,7 +88,7 @@ IST_HD inline void after_sweep(BandedState& s) {
   }
 }
 
-/// After a pass that may have found the pools of the sphere grid too small.
+/// Handles a pass that may have found the pools of the sphere grid too small.
 IST_HD inline void after_grid_pass(const BandedArrays& a, Step next) {
   BandedState& s = *a.state;
   if (a.grid().overflown()) {
@@ -182,7 +182,7 @@ IST_HD inline void after_insert(const BandedArrays& a) {
     schedule.spheres += inserted;
     schedule.covered += s.volume;
   } else {
-    // The packing stops among these: one by one, to find where.
+    // The packing stops among these spheres; adds them one by one to find where.
     for (std::uint64_t first = schedule.spheres, i = 0; i < inserted && !schedule.stopped; ++i)
       schedule.insert(a.spheres[first + i].r);
   }
@@ -197,7 +197,7 @@ IST_HD inline void after_insert(const BandedArrays& a) {
   after_grid_pass(a, Step::count);
 }
 
-/// After `step`: the next one in the order of Step, where nothing else is said.
+/// Chooses the step after `step`: the next one in the order of Step by default.
 IST_HD inline void after_step(const BandedArrays& a, Step step) {
   BandedState& s = *a.state;
   switch (step) {
@@ -211,7 +211,7 @@ IST_HD inline void after_step(const BandedArrays& a, Step step) {
       break;
     case Step::touch_all:
       return after_grid_pass(a, Step::count);
-    case Step::make_room:
+    case Step::reserve_lists:
       return after_grid_pass(a, Step::fill);
     case Step::fill:
       s.use.pairs = 0;

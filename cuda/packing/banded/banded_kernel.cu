@@ -12,8 +12,8 @@
 namespace ist::gpu {
 namespace {
 
-/// A cooperative kernel as a launch (banded_state.h): all its warps. Successive
-/// numbers stand in different blocks, so that little work spreads over many multiprocessors.
+/// A cooperative kernel as a launch (banded_state.h): all its warps. Successive numbers belong to
+/// different blocks, so that little work spreads over many multiprocessors.
 template <class Scratch_>
 class WarpCoopLaunch {
  public:
@@ -75,8 +75,8 @@ __global__ void __launch_bounds__(kThreads, 1)
   pack_banded(coop, arrays, packing::WideMeshSurface(mesh));
 }
 
-/// How many blocks can run at once, which a cooperative launch must not exceed. What is packed does
-/// not depend on it.
+/// The number of blocks that can run at once, which a cooperative launch must not exceed. The
+/// packing does not depend on it.
 unsigned resident_blocks(const Queue& queue) {
   int each = 0;
   check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, banded_kernel, kThreads, kShared),

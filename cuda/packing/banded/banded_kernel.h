@@ -6,14 +6,14 @@
 
 namespace ist::gpu {
 
-/// Where the blocks of a cooperative kernel meet; zero before the first launch.
+/// A barrier of the blocks of a cooperative kernel; zero before the first launch.
 struct CoopBarrier {
   std::uint32_t here;
   std::uint32_t generation;
 };
 
-/// Enqueues a cooperative kernel that packs from the step that the state says until it is finished
-/// or needs something (banded_loop.h).
+/// Enqueues a cooperative kernel that packs from the state's step on until it is finished or needs
+/// larger buffers (banded_loop.h).
 void launch_banded(Queue& queue, const BandedArrays& arrays, const WideTree& mesh,
                    CoopBarrier* barrier);
 

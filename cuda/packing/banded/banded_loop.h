@@ -7,7 +7,7 @@
 
 namespace ist::gpu {
 
-/// Gives a slot to each lane that `keeps` its child, as take_slot() does.
+/// Gives a slot to each lane that `keeps` its child, like take_slot().
 template <class Team>
 IST_HD std::uint32_t take_slots(const Team& team, const BandedArrays& a, bool keeps) {
   BandedState& s = *a.state;
@@ -18,7 +18,7 @@ IST_HD std::uint32_t take_slots(const Team& team, const BandedArrays& a, bool ke
   return fresh ? beyond : a.free_list[taken % a.cell_capacity];
 }
 
-/// split_cells() with a team a child, for so few that no team has a second one.
+/// split_cells() with one team a child, for so few that no team has a second one.
 template <class CoopLaunch, class Shape>
 IST_HD void split_few(CoopLaunch& coop, const BandedArrays& a, const Shape& field) {
   BandedState& s = *a.state;
@@ -57,10 +57,10 @@ IST_HD void split_few(CoopLaunch& coop, const BandedArrays& a, const Shape& fiel
   if (stored || !keeps) atomic_and(&a.splitting[i / 8], ~bit);
 }
 
-/// Replaces cells by those of their children that still count, a lane a child: bounding one has
-/// little to share among lanes. Slots come from the free list, a queue; the parents' own go to its
-/// end, for later steps. A child for which there is no slot stays to be made, and the step is done
-/// again when there are more.
+/// Replaces cells by those of their children that still count, one lane a child: bounding a child
+/// offers little to share among lanes. Slots come from the free list, a queue; the parents' slots
+/// go to its end, for later steps. A child without a slot is created when the step is repeated with
+/// more slots.
 template <class CoopLaunch, class Surface>
 IST_HD void split_cells(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
@@ -114,7 +114,7 @@ IST_HD void split_cells(CoopLaunch& coop, const BandedArrays& a, const Surface& 
   }
 }
 
-/// Zeroes the sphere grid for its new layout.
+/// Clears the sphere grid for its new layout.
 template <class CoopLaunch>
 IST_HD void clear_grid(CoopLaunch& coop, const BandedArrays& a) {
   const SphereLists grid = a.grid();
@@ -130,9 +130,8 @@ IST_HD void clear_grid(CoopLaunch& coop, const BandedArrays& a) {
   });
 }
 
-/// Does the sphere grid's pass `step` over all shares of all pairs that were noted. Few pairs are
-/// shared by teams that would have none: what a pass takes is the time of its longest chain of
-/// atomics.
+/// Does the sphere grid's pass `step` over all shares of all listed pairs. Few pairs are shared
+/// with idle teams: the time of a pass is that of its longest chain of atomics.
 template <class CoopLaunch>
 IST_HD void pass_over_pairs(CoopLaunch& coop, const BandedArrays& a, Step step) {
   const SphereLists grid = a.grid();
@@ -142,13 +141,13 @@ IST_HD void pass_over_pairs(CoopLaunch& coop, const BandedArrays& a, Step step) 
     const Sphere sphere = a.spheres[pair.sphere].sphere();
     const SphereLists::Share share{i % shares, shares};
     if (step == Step::count) grid.count_in_cells(coop.team(), pair, sphere, share);
-    if (step == Step::make_room) grid.make_room(coop.team(), pair, sphere, share);
+    if (step == Step::reserve_lists) grid.reserve_lists(coop.team(), pair, sphere, share);
     if (step == Step::fill) grid.fill_cells(coop.team(), pair, sphere, share);
   });
 }
 
-/// The whole packing (BandedPacker on the CPU, the same spheres bit for bit), from the step that
-/// the state says until it is finished or needs something of the host.
+/// The whole packing (BandedPacker on the CPU, the same spheres bit for bit), from the state's step
+/// on until it is finished or needs something from the host.
 template <class CoopLaunch, class Surface>
 IST_HD void pack_banded(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
@@ -173,7 +172,7 @@ IST_HD void pack_banded(CoopLaunch& coop, const BandedArrays& a, const Surface& 
         break;
       }
       case Step::count:
-      case Step::make_room:
+      case Step::reserve_lists:
       case Step::fill:
         pass_over_pairs(coop, a, step);
         break;

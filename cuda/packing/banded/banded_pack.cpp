@@ -11,8 +11,8 @@
 namespace ist::gpu {
 namespace {
 
-/// The host's side of a packing that somebody looks on at: reports progress while the kernel runs,
-/// and tells it to stop.
+/// The host's side of a packing with a progress callback: reports progress while the kernel runs,
+/// and requests it to stop.
 class Watch {
  public:
   Watch(const packing::PackingLimits& limits, Stage& stage) : schedule_(limits), stage_(stage) {
@@ -30,7 +30,6 @@ class Watch {
 
   Mailbox* mailbox() const { return mailbox_; }
 
-  /// Waits for the queue's work.
   void wait(Queue& queue) {
     if (mailbox_ == nullptr) return queue.wait();
     for (;;) {
@@ -40,7 +39,7 @@ class Watch {
         return;
       }
       look();
-      // A short packing is waited for at once, a long one does not need a core.
+      // Polls at first; a long packing need not occupy a core.
       if (stage_.elapsed() > 0.05) std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
   }

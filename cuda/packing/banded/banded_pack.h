@@ -10,7 +10,7 @@
 namespace ist::gpu {
 
 /// packing::BandedPacker on the GPU: the same spheres, bit for bit. `mesh` is in device memory. The
-/// result's frame is left to the caller.
+/// caller sets the result's frame.
 SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::PackingLimits& limits,
                           Stage& stage);
 

@@ -3,15 +3,16 @@
 #include "cuda/packing/banded/banded_control.h"
 #include "packing/base/certificate.h"
 
-// The steps of a round that choose among the candidates of the active cells, certify the winners
-// and insert them. A step's teams do not wait for each other: certification takes the other winners
-// at their candidates' radii, and a winner's place is the count of those that go before it.
+// The steps of a round that select among the candidates of the active cells, certify the winners
+// and insert them. A step's teams do not wait for each other: certification assumes the other
+// winners at their candidates' radii, and a winner's position is the number of those that precede
+// it.
 
 namespace ist::gpu {
 
 using packing::Candidate;
 
-/// Hangs the active cells' candidates into the chains of their buckets.
+/// Links the active cells' candidates into the chains of their buckets.
 template <class CoopLaunch>
 IST_HD void collect_candidates(CoopLaunch& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
@@ -34,8 +35,8 @@ IST_HD void collect_candidates(CoopLaunch& coop, const BandedArrays& a) {
   });
 }
 
-/// Calls visit(place, candidate) for those in the buckets around a candidate, the lanes going
-/// through different buckets, until it returns false.
+/// Calls visit(place, candidate) for the candidates in the buckets around a candidate until it
+/// returns false. Lanes visit different buckets.
 template <class Team, class Visit>
 IST_HD void for_neighbours(const Team& team, const BandedArrays& a, Float3 centre,
                            const Visit& visit) {
@@ -47,7 +48,7 @@ IST_HD void for_neighbours(const Team& team, const BandedArrays& a, Float3 centr
   }
 }
 
-/// Finds the candidates that no overlapping one goes before.
+/// Finds the candidates that no overlapping one outranks.
 template <class CoopLaunch>
 IST_HD void find_winners(CoopLaunch& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
@@ -66,7 +67,7 @@ IST_HD void find_winners(CoopLaunch& coop, const BandedArrays& a) {
   });
 }
 
-/// The rank bucket of a candidate of this round; larger radii in higher ones.
+/// The rank bucket of a candidate of this round; larger radii have higher ones.
 IST_HD inline std::uint32_t rank_bucket(const BandedState& s, float radius) {
   const std::uint32_t least = bits_of(s.schedule.threshold);
   std::uint32_t shift = 0;
@@ -74,7 +75,7 @@ IST_HD inline std::uint32_t rank_bucket(const BandedState& s, float radius) {
   return (bits_of(radius) - least) >> shift;
 }
 
-/// Takes in a winner of which all is known. A cell whose winner is not accepted loses it.
+/// Accepts or rejects a winner once all its checks are done. A cell loses its rejected winner.
 IST_HD inline void judge_winner(const BandedArrays& a, std::uint32_t w, bool inside) {
   BandedState& s = *a.state;
   Winner& winner = a.winners[w];
@@ -94,9 +95,9 @@ IST_HD inline void judge_winner(const BandedArrays& a, std::uint32_t w, bool ins
   }
 }
 
-/// Works out what radius the winners may keep. Three teams a winner: one finds on which side of the
-/// surface it lies, one how far it is from it, one how far from spheres and other winners; who
-/// comes last judges.
+/// Computes the radius that each winner may keep. Three teams work on a winner: one finds its side
+/// of the surface, one its distance from the surface, one its distance from spheres and other
+/// winners. The last to finish judges.
 template <class CoopLaunch, class Surface>
 IST_HD void certify_winners(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
@@ -116,9 +117,9 @@ IST_HD void certify_winners(CoopLaunch& coop, const BandedArrays& a, const Surfa
       double gap = me.radius;
       for_neighbours(team, a, me.centre, [&](std::uint32_t place, const Candidate& other) {
         if (a.won[place] != 0 && place != winner.node && packing::goes_before(other, me)) {
-          const double room = packing::gap_to_sphere(
+          const double to_sphere = packing::gap_to_sphere(
               me.centre, {other.centre.x, other.centre.y, other.centre.z, other.radius});
-          gap = room < gap ? room : gap;
+          gap = to_sphere < gap ? to_sphere : gap;
         }
         return true;
       });
@@ -136,8 +137,8 @@ IST_HD void certify_winners(CoopLaunch& coop, const BandedArrays& a, const Surfa
   });
 }
 
-/// Inserts the accepted winners in their order, as many as may still come, and notes the blocks of
-/// the sphere grid that they touch.
+/// Inserts the accepted winners in order, up to the limits, and lists the blocks of the sphere grid
+/// that they touch.
 template <class CoopLaunch>
 IST_HD void insert_winners(CoopLaunch& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
@@ -176,7 +177,7 @@ IST_HD void insert_winners(CoopLaunch& coop, const BandedArrays& a) {
   distribute_to_lanes(coop, s.active, [&](std::uint32_t i) {
     if (i >= s.active) return;
     const std::uint32_t bucket = s.buckets.bucket_of(a.nodes[i].candidate.centre, 0, 0, 0);
-    atomic_exchange(&a.heads[bucket], 0);  // that of several, maybe
+    atomic_exchange(&a.heads[bucket], 0);  // several may reset the same bucket
   });
 }
 

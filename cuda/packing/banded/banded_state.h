@@ -9,7 +9,6 @@
 
 namespace ist::gpu {
 
-/// A candidate in a chain of its bucket.
 struct alignas(16) BucketNode {
   packing::Candidate candidate;
   std::uint32_t cell;
@@ -21,9 +20,9 @@ struct Winner {
   std::uint64_t key;     ///< the candidate's; 0: not accepted
   std::uint32_t node;    ///< place in nodes
   std::uint32_t next;    ///< 1 + the next of its rank bucket, 0: the last
-  std::uint32_t checks;  ///< what is known of it, the flags below
+  std::uint32_t checks;  ///< completed checks, the flags below
   float by_surface;      ///< radius certified against the surface
-  float by_spheres;      ///< … against spheres and other winners
+  float by_spheres;      ///< radius certified against spheres and other winners
 
   static constexpr std::uint32_t kBySurface = 1;
   static constexpr std::uint32_t kBySpheres = 2;
@@ -37,7 +36,7 @@ struct Winner {
   IST_HD float radius() const { return by_surface < by_spheres ? by_surface : by_spheres; }
 };
 
-/// Winners by radius, so that one finds its place among them without looking at them all.
+/// Winners by radius, so that a winner finds its position without visiting all others.
 struct RankBuckets {
   static constexpr std::uint32_t kCount = 1024;
   std::uint32_t size[kCount];
@@ -50,7 +49,7 @@ struct alignas(16) StoredSphere {
   IST_HD Sphere sphere() const { return {x, y, z, r}; }
 };
 
-/// Tells a host that watches how far the packing is, and takes its request to stop.
+/// Progress of the packing for a watching host, and its request to stop.
 struct Mailbox {
   volatile std::uint32_t spheres;
   volatile float radius;
@@ -58,33 +57,33 @@ struct Mailbox {
   volatile std::uint32_t stop;  ///< set by the host
 };
 
-/// All that changes but for the large arrays. Read by all teams, written by the last one that comes
-/// to a meeting, or by atomics.
+/// All changing data except for the large arrays. Read by all teams, written by the last team to
+/// reach a barrier, or by atomics.
 struct BandedState {
   packing::BandSchedule schedule;
   Step step = Step::start;
-  Step after_grid = Step::activate;  ///< where the grid's passes lead to
+  Step after_grid = Step::activate;  ///< the step after the grid's passes
   Need need = Need::nothing;
-  std::uint32_t taken = 0;  ///< items of this step that teams took in turns
+  std::uint32_t taken = 0;  ///< items of this step that teams have taken
 
-  // Cells. A slot whose bound is 0 is free, and found by the next sweep.
+  // Cells. A slot with bound 0 is free; the next sweep finds it.
   std::uint32_t slots = 1;             ///< in use or free
   std::uint32_t free = 0;              ///< end of the queue in free_list, before the modulus
   std::uint32_t free_taken = 0;        ///< its front
   std::uint32_t live = 1;              ///< as the schedule counts them
   std::uint32_t top = 0, dropped = 0;  ///< bits of bounds, positive floats
 
-  // Lists of cells. The frontier is in one of two arrays and the active ones go to the other.
+  // Lists of cells. The frontier is in one of two arrays, the active cells in the other.
   std::uint32_t frontier = 0, active = 0, splitting = 0;
   std::uint32_t frontier_array = 0;
   std::uint32_t cell_class = 0, classes = 1;
   bool in_parts = false;                      ///< with steps `refresh` and `confine` before `work`
-  std::uint32_t refreshed = 0, confined = 0;  ///< cells that these left open
+  std::uint32_t refreshed = 0, confined = 0;  ///< cells that these steps left open
 
   // Levels that one step does: see work_on_cells().
   std::uint32_t depth = 0;     ///< levels below the frontier's
   std::uint32_t queued = 0;    ///< children put into the queue
-  std::uint32_t pending = 0;   ///< cells and children not yet done with
+  std::uint32_t pending = 0;   ///< cells and children still to process
   std::uint32_t cascaded = 0;  ///< cells that were split
 
   // Selection.
@@ -110,9 +109,9 @@ struct BandedArrays {
   std::uint32_t* free_list;             ///< slots
   std::uint32_t* lists[2];              ///< frontier and active cells
   std::uint32_t *refreshed, *confined;  ///< cells
-  std::uint32_t* splitting;             ///< cell | children that are still to make << kCellBits
+  std::uint32_t* splitting;             ///< cell | remaining children << kCellBits
   std::uint32_t cell_capacity;
-  std::uint32_t* queue;  ///< children to make, ChildCode; all kNone between steps
+  std::uint32_t* queue;  ///< children to create, ChildCode; all kNone between steps
   std::uint32_t queue_capacity;
 
   BucketNode* nodes;
@@ -123,13 +122,13 @@ struct BandedArrays {
   std::uint32_t candidate_capacity;  ///< heads: twice as many and 64
 
   StoredSphere* spheres;
-  float* kept;  ///< radius over the largest bound when it was inserted, by sphere
+  float* kept;  ///< radius over the largest bound at insertion, by sphere
   std::uint32_t sphere_capacity;
 
   SphereLists lists_of_spheres;  ///< layout and use: see the state
-  Mailbox* mailbox;              ///< null if nobody looks on
+  Mailbox* mailbox;              ///< null without a watching host
 
-  std::uint32_t many = kMany;  ///< cells from which on a level is worked on in parts
+  std::uint32_t many = kMany;  ///< from so many cells on, a level is processed in parts
 
   static constexpr std::uint32_t kMany = 8192;
   static constexpr std::uint32_t kCellBits = 24;
@@ -141,7 +140,7 @@ struct BandedArrays {
   }
 };
 
-/// The packed spheres as the packing numerics ask for them.
+/// The packed spheres in the form that the packing numerics use.
 struct ListedSpheres {
   SphereLists lists;
   const StoredSphere* spheres;

@@ -5,11 +5,11 @@
 
 namespace ist::gpu {
 
-/// The sphere grid in device memory: lists as sets (packing/base/sphere_grid_layout.h), filled
-/// by many teams at once. A table of blocks of 8³ cells; cells where a sphere comes near; a cell's
-/// list is a segment of one pool of words, its length first. Filling goes in passes with a meeting
-/// of all teams between them: touch_blocks of every sphere, then count_in_cells, make_room and
-/// fill_cells of every (sphere, block) pair that it noted.
+/// The sphere grid in device memory: lists as sets (packing/base/sphere_grid_layout.h), filled by
+/// many teams at once. A table of blocks of 8³ cells, cells wherever a sphere is near, and for each
+/// cell a list, which is a segment of one pool of words that starts with its length. Filling takes
+/// passes with a barrier between them: touch_blocks for every sphere, then count_in_cells,
+/// reserve_lists and fill_cells for every (sphere, block) pair that it listed.
 struct SphereLists {
   struct Cell {
     std::uint32_t where;  ///< segment, 0: none; the coverer of a covered cell
@@ -18,21 +18,22 @@ struct SphereLists {
   struct Pair {
     std::uint32_t sphere, block;
   };
-  /// One of `count` equal shares of the cells that a pair has in common.
+  /// One of `count` equal shares of the cells of a pair.
   struct Share {
     std::uint32_t index, count;
   };
-  /// The used part of the pools; above their capacities if they were too small. Then the lists are
-  /// unusable until they are filled again.
+  /// The used part of the pools, above their capacities if they were too small. Then the lists are
+  /// unusable until they are refilled.
   struct Use {
     std::uint64_t words;
     std::uint32_t cell_blocks;
     std::uint32_t pairs;
   };
-  static constexpr std::uint32_t kCoveredBlock = 0x80000000u;   ///< | its coverer
-  static constexpr std::uint32_t kBlockInMaking = 0x7FFFFFFFu;  ///< else 0: no cells, or 1 + which
-  static constexpr std::uint32_t kCovered = 0x80000000u;        ///< in Cell::size
-  static constexpr std::uint32_t kInMaking = 0x80000000u;       ///< in Cell::where
+  static constexpr std::uint32_t kCoveredBlock = 0x80000000u;  ///< | its coverer
+  static constexpr std::uint32_t kBlockInMaking =
+      0x7FFFFFFFu;                                         ///< else 0: no cells, or 1 + their index
+  static constexpr std::uint32_t kCovered = 0x80000000u;   ///< in Cell::size
+  static constexpr std::uint32_t kInMaking = 0x80000000u;  ///< in Cell::where
   static constexpr std::uint32_t kCellsPerBlock = packing::SphereGridLayout::kCellsPerBlock;
   static constexpr std::uint32_t kMostBlocks =
       packing::kMostBlocksPerSide * packing::kMostBlocksPerSide * packing::kMostBlocksPerSide;
@@ -47,15 +48,15 @@ struct SphereLists {
   std::uint64_t word_capacity;
   std::uint32_t block_capacity, pair_capacity;
 
-  /// Words that a list of `size` ≤ 2³⁰ takes, its length included. Grows by steps of a third or
-  /// more.
+  /// The number of words of a list of `size` ≤ 2³⁰, its length included. Grows by steps of a third
+  /// or more.
   IST_HD static std::uint32_t words_for(std::uint32_t size) {
     std::uint32_t step = 8;
     while (4 * step <= size) step *= 2;
     return (size + step) / step * step;
   }
 
-  /// Calls visit(index) in every lane for the spheres listed at x, `valid` where the lane has one.
+  /// Calls visit(index) in every lane for the spheres listed at x; `valid` if the lane has one.
   template <class Team, class Visit>
   IST_HD void for_near(const Team& team, Float3 x, const Visit& visit) const {
     const int i = packing::grid_coordinate(layout, x.x);
@@ -86,8 +87,8 @@ struct SphereLists {
     }
   }
 
-  /// First pass over a sphere: notes the blocks that it comes near, gives them cells, and takes
-  /// those that it covers.
+  /// First pass over a sphere: lists the blocks near it, gives them cells, and marks those that it
+  /// covers.
   template <class Team>
   IST_HD void touch_blocks(const Team& team, std::uint32_t index, const Sphere& s) const {
     const packing::GridRange range = packing::grid_range(layout, s);
@@ -121,7 +122,7 @@ struct SphereLists {
            use->pairs > pair_capacity;
   }
 
-  /// Second pass, over a noted pair: how much longer lists become.
+  /// Second pass, over a listed pair: counts the additional entries of lists.
   template <class Team>
   IST_HD void count_in_cells(const Team& team, const Pair& pair, const Sphere& s,
                              Share share) const {
@@ -135,9 +136,10 @@ struct SphereLists {
     });
   }
 
-  /// Third pass: the first pair that comes to a cell gives it a segment for the longer list.
+  /// Third pass: the first pair at a cell gives it a segment for the longer list.
   template <class Team>
-  IST_HD void make_room(const Team& team, const Pair& pair, const Sphere& s, Share share) const {
+  IST_HD void reserve_lists(const Team& team, const Pair& pair, const Sphere& s,
+                            Share share) const {
     for_cells(team, pair, s, share, [&](Cell& cell, packing::GridRelation) {
       if ((cell.size & kCovered) != 0) return;
       const std::uint32_t old = atomic_or(&cell.where, kInMaking);
@@ -153,7 +155,7 @@ struct SphereLists {
     });
   }
 
-  /// Fourth pass: lists the sphere.
+  /// Fourth pass: adds the sphere to the lists.
   template <class Team>
   IST_HD void fill_cells(const Team& team, const Pair& pair, const Sphere& s, Share share) const {
     for_cells(team, pair, s, share, [&](Cell& cell, packing::GridRelation) {
@@ -166,8 +168,8 @@ struct SphereLists {
   }
 
  private:
-  /// Calls visit(cell, relation) for the cells of the pair's block that the sphere is not away
-  /// from, of this share, in the lanes' own order.
+  /// Calls visit(cell, relation) for the cells of the pair's block, in this share, that the sphere
+  /// comes near. The order depends on the lane.
   template <class Team, class Visit>
   IST_HD void for_cells(const Team& team, const Pair& pair, const Sphere& s, Share share,
                         const Visit& visit) const {
@@ -200,25 +202,25 @@ struct SphereLists {
 enum class Step : std::uint32_t {
   start,       ///< the root cell's side
   sweep,       ///< drop dead cells, find the largest bound; the schedule begins a band
-  clear_grid,  ///< lay the sphere grid out anew …
-  touch_all,   ///< … and list every sphere
-  count,       ///< the sphere grid's passes over the noted pairs
-  make_room,
+  clear_grid,  ///< rebuild the sphere grid
+  touch_all,   ///< list every sphere
+  count,       ///< the sphere grid's passes over the listed pairs
+  reserve_lists,
   fill,
   activate,  ///< cells that reach the margin become the frontier
-  refresh,   ///< the frontier's cells of one class: many settle already, the rest are open
-  confine,   ///< the open cells: what the surface tells of them
-  work,      ///< on the frontier's cells, or those that are open still
-  split,     ///< the cells that have neither settled nor a candidate
+  refresh,   ///< the frontier's cells of one class: settles many, leaves the rest open
+  confine,   ///< the open cells: bounds by the surface
+  work,      ///< on the frontier's cells, or those that are still open
+  split,     ///< the cells that are neither settled nor have a candidate
   collect,   ///< candidates into buckets
-  dominate,  ///< which of them no other one goes before
+  dominate,  ///< the candidates that no other outranks
   certify,
   insert,  ///< winners in order, and the blocks of the grid that they touch
   finished,
 };
 
 /// The buffer that is too small for the next step. The launch ends; the host enlarges it and starts
-/// another launch where this one stopped.
+/// another launch from the same step.
 enum class Need : std::uint32_t { nothing, cells, candidates, spheres, grid };
 
 }  // namespace ist::gpu

@@ -9,12 +9,12 @@ namespace ist::gpu {
 namespace {
 
 constexpr unsigned kThreads = 128;
-/// A triangle over more lines than this is drawn by many threads.
+/// Many threads draw a triangle over more lines than this.
 constexpr std::uint64_t kManyLines = 64;
 
-/// Takes crossings: counts them, or writes each to its line's place.
+/// Receives crossings: counts them, or writes each to its line's segment.
 struct CrossingSink {
-  std::uint32_t* counts;  ///< of each line; counted down again while writing
+  std::uint32_t* counts;  ///< of each line; decremented while writing
   const std::uint32_t* first;
   Crossing* crossings;  ///< null: count
 
@@ -44,7 +44,7 @@ __device__ std::uint64_t lines_over(const LineLattice& lines, const Corners& t,
   return static_cast<std::uint64_t>((high - low) / lines.step_y + 2) * (rows.last - rows.first);
 }
 
-/// A thread a triangle; large ones are put on a list.
+/// One thread a triangle; large ones are appended to a list.
 __global__ void __launch_bounds__(kThreads)
     draw_triangles(WideTree tree, LineLattice lines, CrossingSink sink, std::uint32_t* large,
                    std::uint32_t* large_count) {
@@ -63,7 +63,7 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-/// The large triangles; a warp a row.
+/// The large triangles, one warp a row.
 __global__ void __launch_bounds__(kThreads)
     draw_large(WideTree tree, LineLattice lines, CrossingSink sink, const std::uint32_t* large,
                const std::uint32_t* large_count) {
@@ -93,7 +93,7 @@ __device__ void sort_crossings(Crossing* crossings, std::uint32_t count) {
     }
 }
 
-/// Sorts a line's crossings and counts its spans; a thread a line. Sums the spans' lengths.
+/// Sorts a line's crossings and counts its spans, one thread a line. Sums the spans' lengths.
 __global__ void __launch_bounds__(kThreads)
     count_spans(Crossing* crossings, const std::uint32_t* first, std::uint64_t line_count,
                 std::uint32_t* span_counts, unsigned long long* length) {
@@ -127,7 +127,7 @@ __device__ void set_flag(std::uint32_t* flags, std::uint64_t flag) {
   atomicOr(flags + (flag >> 5), 1u << (flag & 31));
 }
 
-/// The finest level with flags; a thread a column.
+/// The finest level with flags, one thread a column.
 __global__ void __launch_bounds__(kThreads)
     flag_spans(PowerGrid grid, std::uint64_t line_count, std::uint32_t* flags) {
   const std::uint64_t line = std::uint64_t{blockIdx.x} * kThreads + threadIdx.x;
@@ -138,7 +138,7 @@ __global__ void __launch_bounds__(kThreads)
     for_flags(grid, grid.spans[s], i, j, [&](std::uint64_t flag) { set_flag(flags, flag); });
 }
 
-/// A coarser level; a thread a cell.
+/// A coarser level, one thread a cell.
 __global__ void __launch_bounds__(kThreads)
     flag_level(PowerGrid grid, int level, std::uint32_t* flags) {
   const std::uint64_t flag = std::uint64_t{blockIdx.x} * kThreads + threadIdx.x;

@@ -12,11 +12,11 @@ namespace {
 
 constexpr unsigned kWarps = 4;
 constexpr unsigned kThreads = 32 * kWarps;
-constexpr double kAnywhere = 1e30;         // beyond any distance, unit frame
+constexpr double kAnywhere = 1e30;         // further than any distance, unit frame
 constexpr unsigned kBlocksEach = 12;       // blocks a multiprocessor
 constexpr std::uint32_t kShortList = 256;  // lists up to this long are filtered in shared memory
 
-/// The solid, as cover_cell() asks it.
+/// The solid in the form that cover_cell() uses.
 struct DeviceCoverSurface {
   WarpTeam team;
   const WideTree& tree;
@@ -37,17 +37,17 @@ struct DeviceCoverSurface {
 struct Frontier {
   CoverCell* cells;
   std::uint32_t* lists;
-  std::uint32_t cell_room, list_room;
+  std::uint32_t cell_capacity, list_capacity;
 };
 
 /// Progress of a level. Counts continue beyond the capacities, so that the host learns the need.
 struct Counters {
-  std::uint32_t next;  ///< child that a warp takes
+  std::uint32_t next;  ///< the next child to take
   std::uint32_t cells, listed;
   std::uint32_t scratch;
 };
 
-/// Makes each ball as large as the solid around its centre, and by the slack larger. A warp a ball.
+/// Makes each ball as large as the solid around its centre plus the slack, one warp a ball.
 __global__ void __launch_bounds__(kThreads)
     clear_balls(WideTree tree, CoverBall* balls, std::uint32_t count, double slack) {
   const std::uint32_t k = blockIdx.x * kWarps + threadIdx.x / 32;
@@ -66,10 +66,10 @@ __global__ void list_all(std::uint32_t* list, std::uint32_t count) {
   if (k < count) list[k] = k;
 }
 
-/// The children of every cell of `from`, a warp each.
+/// Divides every cell of `from` into children, one warp each.
 __global__ void __launch_bounds__(kThreads)
     divide(WideTree tree, CoverLevel level, Frontier from, std::uint32_t cell_count, Frontier to,
-           std::uint32_t* scratch, std::uint32_t scratch_room, unsigned long long* raised,
+           std::uint32_t* scratch, std::uint32_t scratch_capacity, unsigned long long* raised,
            Counters* counters) {
   __shared__ std::uint32_t short_lists[kWarps][kShortList];
   const WarpTeam team;
@@ -81,7 +81,7 @@ __global__ void __launch_bounds__(kThreads)
     std::uint32_t* keep = short_lists[threadIdx.x / 32];
     if (cell.count > kShortList) {
       const std::uint32_t at = take(team, &counters->scratch, cell.count);
-      if (at + cell.count > scratch_room) continue;  // the host sees it and tries again
+      if (at + cell.count > scratch_capacity) continue;  // the host sees it and tries again
       keep = scratch + at;
     }
     const CoverVerdict verdict =
@@ -92,7 +92,7 @@ __global__ void __launch_bounds__(kThreads)
     if (verdict.divide) {
       const std::uint32_t first = take(team, &counters->listed, verdict.count);
       const std::uint32_t place = take(team, &counters->cells, 1);
-      if (first + verdict.count <= to.list_room && place < to.cell_room) {
+      if (first + verdict.count <= to.list_capacity && place < to.cell_capacity) {
         for (std::uint32_t i = static_cast<std::uint32_t>(team.lane()); i < verdict.count; i += 32)
           to.lists[first + i] = keep[i];
         cell.inside = verdict.inside;
@@ -109,15 +109,15 @@ struct FrontierArrays {
   DeviceArray<CoverCell> cells;
   DeviceArray<std::uint32_t> lists;
 
-  FrontierArrays(Queue& queue, std::size_t cell_room, std::size_t list_room)
-      : cells(queue, cell_room), lists(queue, list_room) {}
+  FrontierArrays(Queue& queue, std::size_t cell_capacity, std::size_t list_capacity)
+      : cells(queue, cell_capacity), lists(queue, list_capacity) {}
   Frontier view() const {
     return {cells.data(), lists.data(), static_cast<std::uint32_t>(cells.size()),
             static_cast<std::uint32_t>(lists.size())};
   }
 };
 
-/// Finds the largest protrusion of balls, a warp a ball.
+/// Finds the largest protrusion of balls, one warp a ball.
 __global__ void __launch_bounds__(kThreads)
     find_protrusion(WideTree tree, const Sphere* balls, std::uint32_t count,
                     unsigned long long* largest) {
@@ -127,7 +127,7 @@ __global__ void __launch_bounds__(kThreads)
   const double centre[3] = {balls[k].x, balls[k].y, balls[k].z};
   const double distance = exact_nearest(team, tree, centre, kAnywhere).distance;
   const double out = protrusion_of(balls[k].r, distance, inside(team, tree, centre));
-  if (team.lane() == 0 && out > 0)  // positive doubles order as their bits
+  if (team.lane() == 0 && out > 0)  // positive doubles are ordered like their bits
     atomicMax(largest, static_cast<unsigned long long>(__double_as_longlong(out)));
 }
 

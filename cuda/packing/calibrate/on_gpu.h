@@ -40,12 +40,11 @@ class ColumnsOnGpu {
 std::vector<double> cover_radii(Queue& queue, const WideTree& mesh, const CoverTask& task,
                                 const std::function<void(int)>& report);
 
-/// How far any of the balls sticks out of the solid at most, at least 0; unit frame, as on the
-/// host.
+/// The largest protrusion of the balls from the solid, at least 0; unit frame, as on the host.
 double largest_protrusion(Queue& queue, const WideTree& mesh, std::span<const Sphere> balls);
 
-/// Relaxes sites within a solid's columns, bit for bit as on the host. `report(part)` is called
-/// with the part that is done, [0, 1]. Returns none if the columns cannot measure the solid.
+/// Relaxes sites within a solid's columns, bit for bit as on the host. `report(part)` receives the
+/// completed part, [0, 1]. Returns none if the columns cannot measure the solid.
 RelaxedSites relax_sites(Queue& queue, const WideTree& mesh, const RelaxTask& task,
                          const std::function<void(double)>& report);
 

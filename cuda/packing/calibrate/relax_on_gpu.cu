@@ -51,7 +51,6 @@ class BlockTeam {
     return earlier + before;
   }
 
-  /// The value of lane `from`.
   __device__ std::uint32_t broadcast(std::uint32_t value, int from) const {
     if (lane() == from) shared_.words[0] = value;
     __syncthreads();
@@ -61,7 +60,7 @@ class BlockTeam {
   }
 
  private:
-  /// Every warp's value into shared memory.
+  /// Writes every warp's value to shared memory.
   __device__ void exchange(std::uint64_t value) const {
     if (threadIdx.x % 32 == 0) shared_.words[threadIdx.x / 32] = value;
     __syncthreads();
@@ -74,25 +73,24 @@ class BlockTeam {
 constexpr unsigned kWarps = 8;
 constexpr unsigned kThreads = 32 * kWarps;
 constexpr unsigned kBlocksEach = 6;  // blocks a multiprocessor
-// The coarsest levels, of few cells with long lists: a block a cell, of so many threads.
+// The coarsest levels have few cells with long lists: one block a cell, with this many threads.
 constexpr unsigned kLongThreads = 1024;
 constexpr int kLongLevels = 3, kBlockLevels = 5;
 
-/// A cell to look into, with its parent's list.
+/// A cell to examine, with its parent's list.
 struct PowerTask {
   PowerGridCell cell;
   std::uint32_t first, count;
 };
 
-/// Device memory of one round.
 struct PowerRound {
   PowerGrid grid;
   const PowerSite* sites;
   PowerSums* sums;
-  PowerTask* tasks[2];      ///< of the levels in turn
-  std::uint32_t task_room;  ///< in each
+  PowerTask* tasks[2];          ///< of the levels in turn
+  std::uint32_t task_capacity;  ///< in each
   std::uint32_t* lists;
-  std::uint32_t list_room;
+  std::uint32_t list_capacity;
   std::uint32_t* task_counts;  ///< of every level; may exceed the capacity
   std::uint32_t* listed;       ///< likewise
 };
@@ -118,8 +116,8 @@ __device__ unsigned long long wide_warp_sum(unsigned long long value) {
          (static_cast<unsigned long long>(high) << 2 * kBits);
 }
 
-/// Cuts a cell's columns, a lane a column, and adds up what each site has before it goes to memory
-/// that all share.
+/// Cuts a cell's columns, one lane a column, and combines each site's sums before they go to shared
+/// memory.
 __device__ void walk_short(const WarpTeam& team, const PowerRound& round, const PowerBlock& block,
                            const std::uint32_t* list, std::uint32_t count) {
   PowerSums mine[kPowerLeafSites] = {};
@@ -143,16 +141,16 @@ __device__ void walk_short(const WarpTeam& team, const PowerRound& round, const 
   }
 }
 
-/// Examines one cell, all of the team together; `short_list`: kPowerLeafSites elements of memory
-/// that the team shares.
+/// Examines one cell with the whole team; `short_list`: kPowerLeafSites elements of memory that the
+/// team shares.
 template <class Team>
 __device__ void look_into(const Team& team, const PowerRound& round, const PowerTask& task,
                           std::uint32_t* short_list) {
   const PowerGrid& grid = round.grid;
   const std::uint32_t* parent_list = round.lists + task.first;
   const PowerFilter filter(team, grid, task.cell, round.sites, parent_list, task.count);
-  /// Writes the first `room` sites that pass, and returns how many pass.
-  const auto filtered = [&](std::uint32_t* out, std::uint32_t room) {
+  /// Writes the first `capacity` sites that pass, and returns how many pass.
+  const auto filtered = [&](std::uint32_t* out, std::uint32_t capacity) {
     std::uint32_t kept = 0;
     for (std::uint32_t base = 0; base < task.count; base += Team::kWidth) {
       const std::uint32_t i = base + static_cast<std::uint32_t>(team.lane());
@@ -160,7 +158,7 @@ __device__ void look_into(const Team& team, const PowerRound& round, const Power
       int total = 0;
       const std::uint32_t place =
           kept + static_cast<std::uint32_t>(team.exclusive_count(stays, total));
-      if (stays && place < room) out[place] = parent_list[i];
+      if (stays && place < capacity) out[place] = parent_list[i];
       kept += static_cast<std::uint32_t>(total);
     }
     team.sync();
@@ -171,7 +169,7 @@ __device__ void look_into(const Team& team, const PowerRound& round, const Power
   std::uint32_t first = 0;
   if (kept > kPowerLeafSites) {
     first = take(team, round.listed, kept);
-    if (first + kept > round.list_room) return;  // the host sees it and tries again
+    if (first + kept > round.list_capacity) return;  // the host sees it and tries again
     filtered(round.lists + first, kept);
     list = round.lists + first;
   }
@@ -195,7 +193,7 @@ __device__ void look_into(const Team& team, const PowerRound& round, const Power
   const PowerGridCell child = child_of(task.cell, static_cast<std::uint32_t>(octant) & 7);
   const bool needed = octant < 8 && !is_empty(grid, child);
   const std::uint32_t at = append(team, needed, round.task_counts + child.level);
-  if (needed && at < round.task_room) round.tasks[child.level % 2][at] = {child, first, kept};
+  if (needed && at < round.task_capacity) round.tasks[child.level % 2][at] = {child, first, kept};
 }
 
 __host__ __device__ std::uint32_t least(std::uint32_t a, std::uint32_t b) { return a < b ? a : b; }
@@ -214,24 +212,24 @@ __global__ void start_round(PowerRound round, std::uint32_t site_count) {
   round.tasks[top % 2][0] = {{0, 0, 0, top}, 0, site_count};
 }
 
-/// A level of few cells: a block a cell.
+/// A level of few cells: one block a cell.
 template <unsigned kEach>
 __global__ void __launch_bounds__(kEach) look_into_blocks(PowerRound round, int level) {
   __shared__ typename BlockTeam<kEach>::Shared shared;
   __shared__ std::uint32_t short_list[kPowerLeafSites];
   const BlockTeam<kEach> team(shared);
-  const std::uint32_t count = least(round.task_counts[level], round.task_room);
+  const std::uint32_t count = least(round.task_counts[level], round.task_capacity);
   for (std::uint32_t k = blockIdx.x; k < count; k += gridDim.x) {
     look_into(team, round, round.tasks[level % 2][k], short_list);
     team.sync();
   }
 }
 
-/// A level of many cells: a warp a cell.
+/// A level of many cells: one warp a cell.
 __global__ void __launch_bounds__(kThreads) look_into_cells(PowerRound round, int level) {
   __shared__ std::uint32_t short_lists[kWarps][kPowerLeafSites];
   const WarpTeam team;
-  const std::uint32_t count = least(round.task_counts[level], round.task_room);
+  const std::uint32_t count = least(round.task_counts[level], round.task_capacity);
   for (std::uint32_t k = blockIdx.x * kWarps + threadIdx.x / 32; k < count;
        k += gridDim.x * kWarps) {
     look_into(team, round, round.tasks[level % 2][k], short_lists[threadIdx.x / 32]);
@@ -239,7 +237,6 @@ __global__ void __launch_bounds__(kThreads) look_into_cells(PowerRound round, in
   }
 }
 
-/// The sums' total length.
 __global__ void __launch_bounds__(kThreads)
     sum_lengths(const PowerSums* sums, std::uint32_t count, unsigned long long* total) {
   const std::uint32_t k = blockIdx.x * kThreads + threadIdx.x;
@@ -260,7 +257,7 @@ __global__ void __launch_bounds__(kThreads)
   sites[k] = site;
 }
 
-/// The rounds' memory, which grows where it must.
+/// The memory of the rounds, which grows as needed.
 class Relaxation {
  public:
   Relaxation(Queue& queue, const PowerGrid& grid, std::span<const PowerSite> sites)
@@ -330,7 +327,7 @@ class Relaxation {
     }
   }
 
-  /// Whether the last cut fitted; if not, enlarges the buffers.
+  /// True if the last cut fitted; if not, enlarges the buffers.
   bool fits() {
     const std::vector<std::uint32_t> used = counters_.to_host(counters_.size());
     std::uint32_t most = 0;

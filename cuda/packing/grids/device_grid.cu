@@ -13,7 +13,7 @@
 namespace ist::gpu {
 namespace {
 
-/// The words of a distance grid, to be changed.
+/// The words of a distance grid, mutable.
 struct GridWords {
   std::uint32_t* words = nullptr;
   const std::uint32_t* keys = nullptr;  ///< nullptr: not hashed
@@ -44,7 +44,7 @@ constexpr unsigned kThreads = 128;
 
 __device__ unsigned global_thread() { return blockIdx.x * kThreads + threadIdx.x; }
 
-/// A block a sphere: calls act(cell, covered) for what it meets or covers.
+/// Calls act(cell, covered) for the cells that a sphere meets or covers, one block a sphere.
 template <class Act>
 __device__ void for_sphere_cells(const GridLayout& g, const Sphere& s, bool covered_too,
                                  const Act& act) {
@@ -67,7 +67,7 @@ __global__ void cover_cells(const GridLayout g, const Sphere* spheres, std::uint
     });
 }
 
-/// With `lists` null counts, else fills.
+/// Counts if `lists` is null, else fills.
 __global__ void list_spheres_of(const GridLayout g, const Sphere* spheres, std::uint32_t end,
                                 GridWords words, CellRecord* records, std::uint32_t* lists) {
   for (std::uint32_t n = blockIdx.x; n < end; n += gridDim.x)
@@ -199,12 +199,12 @@ GridScene DeviceGrid::scene() const {
 
 void DeviceGrid::append(const Sphere* spheres, std::size_t count) {
   if (sphere_count_ + count > spheres_.size()) {
-    const std::size_t room =
+    const std::size_t capacity =
         std::max<std::size_t>({1024, 2 * spheres_.size(), sphere_count_ + count});
     if (spheres_.size() == 0) {
-      spheres_ = DeviceArray<Sphere>(*queue_, room);
+      spheres_ = DeviceArray<Sphere>(*queue_, capacity);
     } else {
-      spheres_.grow(room, sphere_count_);
+      spheres_.grow(capacity, sphere_count_);
     }
   }
   check(cudaMemcpyAsync(spheres_.data() + sphere_count_, spheres, count * sizeof(Sphere),
@@ -264,7 +264,7 @@ void DeviceGrid::update() {
   measure_distances();
 }
 
-/// Counts the cells that go inactive in the counter.
+/// Adds the cells that become inactive to the counter.
 void DeviceGrid::cover(std::size_t first_new) {
   if (sphere_count_ > first_new) {
     const auto most = static_cast<std::size_t>(64 * queue_->multiprocessors());

@@ -16,20 +16,20 @@ void prepare_triangles(Queue& queue, const DeviceArray<double>& vertices,
                        const DeviceArray<std::uint32_t>& corners,
                        DeviceArray<packing::GridTriangle>& triangles);
 
-/// Adds to each cell the number of triangles that overlap it, and to `crossings` their terms in the
-/// winding number along its row's centre line. `large`: an element for every triangle.
+/// Adds to each cell the number of triangles that overlap it, and to `crossings` their terms of the
+/// winding number along the centre line of its row. `large`: an element for every triangle.
 void count_triangles(Queue& queue, const packing::GridScene& mesh,
                      const packing::GridLayout& layout, std::uint32_t count,
                      DeviceArray<std::uint32_t>& counts, DeviceArray<std::int32_t>& crossings,
                      DeviceArray<std::uint32_t>& large);
 
-/// Marks the words of what is outside as inactive, the others with 0; turns crossings into the
+/// Marks the words of cells outside as inactive, the others with 0; turns crossings into the
 /// windings of records.
 void classify_rows(Queue& queue, const packing::GridLayout& layout,
                    const DeviceArray<std::uint32_t>& counts, DeviceArray<std::int32_t>& windings,
                    DeviceArray<std::uint32_t>& words);
 
-/// Fills the triangle lists of the records that `words` lead to. `filled`: a counter a cell.
+/// Fills the triangle lists of the records that `words` refer to. `filled`: a counter a cell.
 void fill_triangle_lists(Queue& queue, const packing::GridScene& mesh,
                          const packing::GridLayout& layout, std::uint32_t count,
                          const DeviceArray<std::uint32_t>& words,
@@ -40,16 +40,17 @@ void fill_triangle_lists(Queue& queue, const packing::GridScene& mesh,
 /// The distance grid (packing/grids/host_grid.h) in device memory. Its arrays belong to the queue.
 class DeviceGrid {
  public:
-  /// Uploads the mesh's exact arrays, which are in use until Queue::wait().
+  /// Uploads the mesh's exact arrays, which must stay valid until Queue::wait().
   DeviceGrid(Queue& queue, const MeshView& mesh);
 
-  /// A new grid of that layout. Throws Error if more cells are active than a word can address.
+  /// Builds a new grid of that layout. Throws Error if more cells are active than a word can
+  /// address.
   void build(const packing::GridLayout& layout);
-  /// Appends spheres; they count after the next build() or update().
+  /// Appends spheres, which count after the next build() or update().
   void append(const Sphere* spheres, std::size_t count);
   void update();
 
-  /// For kernels; valid until the next change.
+  /// The scene for kernels; valid until the next change.
   packing::GridScene scene() const;
   const packing::GridLayout& layout() const { return layout_; }
 
@@ -73,7 +74,7 @@ class DeviceGrid {
   DeviceArray<std::uint32_t> corners_;
   DeviceArray<packing::GridTriangle> triangles_;
   DeviceArray<Sphere> spheres_;
-  std::size_t sphere_count_ = 0, listed_ = 0;  ///< of them, the first so many are in the lists
+  std::size_t sphere_count_ = 0, listed_ = 0;  ///< the first `listed_` are in the lists
 
   packing::GridLayout layout_;
   DeviceArray<std::uint32_t> words_, keys_;

@@ -12,8 +12,8 @@
 namespace ist::gpu {
 namespace {
 
-/// The warps of a block that search together for one prototype (packing/grids/nearest_primitive.h):
-/// where there are few prototypes, this is what fills the card.
+/// The warps of a block that search together for one prototype (packing/grids/nearest_primitive.h).
+/// This fills the device if there are few prototypes.
 struct SearchBlock : WarpTeam {
   static constexpr unsigned kWarps = 8;
   static constexpr unsigned kThreads = 32 * kWarps;
@@ -39,7 +39,7 @@ struct SearchBlock : WarpTeam {
     __syncthreads();
   }
 
-  /// A bound for the search, no worse than `mine`. How much better it is only time tells, and no
+  /// A bound for the search, no worse than `mine`. How much better it is depends on timing, but no
   /// result depends on it.
   __device__ float least_so_far(float mine) const {
     std::uint32_t least = ordered_bits(mine);
@@ -50,7 +50,7 @@ struct SearchBlock : WarpTeam {
     return from_ordered_bits(broadcast(least, 0));
   }
 
-  /// The least of all warps' values.
+  /// The minimum of all warps' values.
   __device__ std::uint64_t end_search(std::uint64_t mine) const {
     if (lane() == 0)
       atomicMin(reinterpret_cast<unsigned long long*>(&memory->found),
@@ -87,7 +87,7 @@ __global__ void split_cells(const GridLayout coarse, const GridLayout fine,
   children[c] = fine.id(2 * i + (n & 1), 2 * j + (n >> 1 & 1), 2 * k + (n >> 2));
 }
 
-/// A warp per cell if it has many cells of the distance grid, else a thread. In any order.
+/// One warp a cell if it has many cells of the distance grid, else one thread. In any order.
 template <bool kByWarp>
 __global__ void keep_active_cells(const __grid_constant__ GridScene scene,
                                   const __grid_constant__ GridLayout prototypes,
@@ -119,7 +119,7 @@ __global__ void converge_prototypes(const __grid_constant__ GridScene scene,
   }
 }
 
-/// The same, a block a prototype.
+/// The same, one block a prototype.
 __global__ void converge_by_blocks(const __grid_constant__ GridScene scene,
                                    const __grid_constant__ packing::AscentSettings settings,
                                    const std::uint32_t* cells, std::uint32_t end,
@@ -156,7 +156,7 @@ __global__ void select_ahead(const GridLayout layout, const CellTable table,
   ahead[atomicAdd(ahead_count, 1u)] = n;
 }
 
-/// A warp a candidate against all others that are ahead of their neighbours.
+/// Compares a candidate with all others that outrank their neighbours, one warp a candidate.
 __global__ void select_winners(const GridCandidate* candidates, const std::uint32_t* ahead,
                                const std::uint32_t* ahead_count, std::uint32_t* winners,
                                std::uint32_t* winner_count) {
@@ -184,11 +184,11 @@ __global__ void certify(const __grid_constant__ GridScene scene, const GridCandi
   if (n >= count) return;
   const WarpTeam team;
   const GridCandidate c = candidates[winners[n]];
-  const double room = packing::certified_room(team, scene, c);
-  if (team.lane() == 0) certified[n] = {c, room};
+  const double radius = packing::certified_clearance(team, scene, c);
+  if (team.lane() == 0) certified[n] = {c, radius};
 }
 
-/// Prototypes up to which a block works on each.
+/// Up to this many prototypes, a block works on each.
 constexpr std::size_t kMostBlocks = 1024;
 
 enum Counter { kKept, kNext, kAhead, kWinners };
@@ -237,11 +237,11 @@ bool DeviceRounds::converge(const packing::AscentSettings& settings, const packi
     cells_ = std::move(kept);
   }
   candidates_ = DeviceArray<GridCandidate>(queue_, count_);
-  constexpr std::size_t kChunk = std::size_t{1} << 17;  // between two looks at clock and progress
+  constexpr std::size_t kChunk = std::size_t{1} << 17;  // between two checks of clock and progress
   for (std::size_t from = 0; from < count_; from += kChunk) {
     const std::size_t end = std::min(count_, from + kChunk);
     const auto most = static_cast<std::size_t>(16 * queue_.multiprocessors());
-    // Every warp takes one number too many.
+    // Every warp takes one number more than there are.
     const auto next = static_cast<std::uint32_t>(from);
     check(cudaMemcpyAsync(counters_.data() + kNext, &next, sizeof next, cudaMemcpyHostToDevice,
                           stream),
@@ -302,7 +302,7 @@ std::vector<GridWinner> DeviceRounds::round(const packing::AscentSettings& setti
 
 void DeviceRounds::append(const std::vector<Sphere>& spheres) {
   grid_.append(spheres.data(), spheres.size());
-  queue_.wait();  // the vector is the caller's
+  queue_.wait();  // the vector belongs to the caller
 }
 
 }  // namespace ist::gpu

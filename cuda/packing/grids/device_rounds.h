@@ -7,11 +7,11 @@
 
 namespace ist::gpu {
 
-/// The work of a grid packing's rounds on the GPU (packing/grids/ascent.h says what the calls
-/// do), a warp a prototype. Must not outlive the queue.
+/// The work of a grid packing's rounds on the GPU (packing/grids/ascent.h documents the calls), one
+/// warp a prototype. Must not outlive the queue.
 class DeviceRounds {
  public:
-  /// `mesh`'s exact arrays are in use until the first round.
+  /// The exact arrays of `mesh` must stay valid until the first round.
   DeviceRounds(Queue& queue, const MeshView& mesh)
       : queue_(queue), grid_(queue, mesh), counters_(queue, 4) {}
 
@@ -26,13 +26,13 @@ class DeviceRounds {
   void update() { grid_.update(); }
 
  protected:
-  /// Keeps the active cells and lets their prototypes converge; false if `go_on` gave up.
+  /// Keeps the active cells and lets their prototypes converge; false if `go_on` returned false.
   bool converge(const packing::AscentSettings& settings, const packing::GoOn& go_on);
 
   Queue& queue_;
   DeviceGrid grid_;
   packing::GridLayout prototypes_;
-  DeviceArray<std::uint32_t> cells_;  ///< of the prototype grid, active as of the last round
+  DeviceArray<std::uint32_t> cells_;  ///< active cells of the prototype grid after the last round
   std::size_t count_ = 0;             ///< of these
   DeviceArray<packing::GridCandidate> candidates_;
   DeviceArray<std::uint32_t> counters_;

@@ -77,7 +77,7 @@ __device__ void act_on(const GridScene& mesh, const GridLayout& g, std::uint32_t
             range.lo[2] + static_cast<int>(n / ny));
 }
 
-/// A warp a triangle. Those that may meet many cells are left to the whole grid of threads.
+/// One warp a triangle. Triangles that may meet many cells are left to the whole grid of threads.
 template <class Act>
 __global__ void act_on_small_triangles(const GridScene mesh, const GridLayout g,
                                        std::uint32_t count, Act act, std::uint32_t* large,
@@ -102,7 +102,7 @@ __global__ void act_on_large_triangles(const GridScene mesh, const GridLayout g,
   }
 }
 
-/// A warp a row: HostGrid::classify().
+/// HostGrid::classify(), one warp a row.
 __global__ void classify_row_of_warp(const GridLayout g, const std::uint32_t* counts,
                                      std::int32_t* windings, std::uint32_t* words) {
   const unsigned row = global_thread() / 32;

@@ -8,7 +8,7 @@ SpherePacking pack_grids(Queue& queue, const MeshSolid& solid, const PackingSett
                          Stage& stage) {
   std::size_t free_bytes = 0, total_bytes = 0;
   check(cudaMemGetInfo(&free_bytes, &total_bytes), "querying the free memory");
-  // Half of it is for prototypes and what else lives on the device.
+  // Half of the memory is for prototypes and other data on the device.
   SpherePacking result = packing::pack_grids_by(DeviceRounds(queue, solid.arrays()), solid,
                                                 settings, free_bytes / 2, stage);
   queue.wait();

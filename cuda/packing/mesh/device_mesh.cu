@@ -16,8 +16,8 @@ __device__ Corners corners_of(const double* vertices, const std::uint32_t* t) {
            vertices + 3 * std::size_t{t[2]}}};
 }
 
-/// Writes the union of its lanes' boxes as the box of a node's child; `place` counts nodes and
-/// blocks alike and is not the root's.
+/// Writes the union of the lanes' boxes as the box of a node's child. `place` counts nodes and
+/// blocks together and is not the root's.
 __device__ void write_joint_box(WideBox box, WideNode* nodes, std::uint32_t place) {
   const WarpTeam team;
   for (int k = 0; k < 3; ++k) {
@@ -35,7 +35,7 @@ __device__ void add_up(WideMoments& moments) {
   });
 }
 
-/// The box, in directions of its own, of the triangles that the lanes have.
+/// Writes the oriented box of the triangles of all lanes.
 __device__ void write_oriented_box(const Corners& corners, bool present, const double* origin,
                                    WideOriented& boxes, int child) {
   const WarpTeam team;
@@ -52,7 +52,7 @@ __device__ void write_oriented_box(const Corners& corners, bool present, const d
   if (team.lane() == 0) box.write_to(boxes, child);
 }
 
-/// A warp a block of triangles; blocks that are not there leave empty boxes in the last node.
+/// One warp a block of triangles; missing blocks leave empty boxes in the last node.
 __global__ void fill_blocks(const double* vertices, const std::uint32_t* triangles,
                             const std::uint32_t* order, std::uint32_t count, WideBlock* blocks,
                             std::uint32_t block_count, WideNode* nodes, WideOriented* oriented,
@@ -77,7 +77,8 @@ __global__ void fill_blocks(const double* vertices, const std::uint32_t* triangl
                      static_cast<int>(index % kWideWidth));
 }
 
-/// Gives each of a level's nodes, counted from `first`, its box in the level above. A warp a node.
+/// Writes the box of each of a level's nodes, counted from `first`, to the level above. One warp a
+/// node.
 __global__ void join_boxes(WideNode* nodes, std::uint32_t first, std::uint32_t node_count) {
   const std::uint32_t index = blockIdx.x * kWarps + threadIdx.x / 32;
   const int lane = static_cast<int>(threadIdx.x % 32);

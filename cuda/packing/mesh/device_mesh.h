@@ -9,11 +9,11 @@
 
 namespace ist::gpu {
 
-/// A mesh and its hierarchy in device memory. The arrays belong to the queue they were made on.
+/// A mesh and its hierarchy in device memory. The arrays belong to the queue of their construction.
 class DeviceMesh {
  public:
-  /// Uploads the vertices and the 1 … 2^30 triangles, from pageable or pinned memory, and builds,
-  /// in the queue's order. The host arrays are in use until Queue::wait().
+  /// Uploads the vertices and the 1 … 2^30 triangles, from pageable or pinned memory, and builds
+  /// the hierarchy in the queue's order. The host arrays must stay valid until Queue::wait().
   DeviceMesh(Queue& queue, const MeshView& mesh);
 
   /// The view for kernels; its pointers are to device memory.
@@ -30,11 +30,11 @@ class DeviceMesh {
   WideTree tree_;
 };
 
-/// The order in which a hierarchy takes a mesh's triangles (indices): successive ones lie close
-/// together, in every part of it that makes a block or a node (mesh/hierarchy/wide_tree.h). The
-/// mesh is cut across its longest side, and so are the parts, down to blocks: searches then look at
-/// a third fewer blocks and nodes than along Hilbert's curve. `vertices`: double[3 · …] in the unit
-/// frame, `triangles`: uint32[3 · count], both in device memory. Of one mesh always the same.
+/// The order of a mesh's triangles (indices) in its hierarchy: successive triangles are close
+/// together in every part that makes a block or a node (mesh/hierarchy/wide_tree.h). The mesh is
+/// cut across its longest side, and so are the parts, down to blocks: searches then visit a third
+/// fewer blocks and nodes than with Hilbert's curve. `vertices`: double[3 · …] in the unit frame,
+/// `triangles`: uint32[3 · count], both in device memory. The order depends on the mesh alone.
 DeviceArray<std::uint32_t> order_triangles(Queue& queue, const double* vertices,
                                            const std::uint32_t* triangles, std::uint32_t count);
 

@@ -1,9 +1,9 @@
 #include "cuda/packing/mesh/device_mesh.h"
 
-// Parts of a power of two of triangles begin at multiples of it, so that a place in the order tells
-// its part. The triangles of one last node are cut in halves in shared memory; larger parts, by
-// sorting all of them at once, in 4, 4 and 2 a level of nodes: fewer sorts than halving, and no
-// worse.
+// Parts of a power of two of triangles begin at multiples of it, so a position in the order
+// determines its part. The triangles of one last node are halved in shared memory; larger parts are
+// divided by sorting all of them at once, into 4, 4 and 2 a level of nodes, which needs fewer sorts
+// than halving and is no worse.
 #include <cub/device/device_radix_sort.cuh>
 
 #include <algorithm>
@@ -17,8 +17,8 @@
 namespace ist::gpu {
 namespace {
 
-/// Sorts pairs by the lowest `bits` bits of their keys, ascending; equal keys keep their order. The
-/// arrays are of the same size and come back sorted; in between twice their memory is in use.
+/// Sorts pairs by the lowest `bits` bits of their keys, ascending and stable. Both arrays have the
+/// same size and are replaced; meanwhile twice their memory is in use.
 void sort_pairs(Queue& queue, DeviceArray<std::uint32_t>& keys, DeviceArray<std::uint32_t>& values,
                 int bits) {
   const auto count = static_cast<int>(keys.size());
@@ -63,8 +63,8 @@ __global__ void __launch_bounds__(kThreads)
   order[i] = i;
 }
 
-/// The box of some points as six words of which the smaller ones win: of the lower corner, then of
-/// the upper one turned over. All bits set: of no points.
+/// The box of some points as six words, combined by minimum: of the lower corner, then of the
+/// negated upper one. All bits set: no points.
 struct Extent {
   std::uint32_t word[6];
 
@@ -78,7 +78,7 @@ struct Extent {
     return axis;
   }
 
-  /// The place of a coordinate between the sides, in 0 … most.
+  /// The position of a coordinate between the sides, in 0 … most.
   __device__ std::uint32_t place(float x, int axis, std::uint32_t most) const {
     const float side = upper(axis) - lower(axis);
     const float cells = static_cast<float>(most);
@@ -87,7 +87,6 @@ struct Extent {
   }
 };
 
-/// That of the warp's points.
 __device__ Extent extent_of_warp(const WarpTeam& warp, bool present, const float point[3]) {
   Extent extent;
   for (int k = 0; k < 3; ++k) {
@@ -152,7 +151,7 @@ __device__ std::uint32_t sort_in_block(std::uint32_t key, unsigned size, std::ui
   return key;
 }
 
-/// Orders the triangles of every last node: a block a node.
+/// Orders the triangles of every last node, one block a node.
 __global__ void __launch_bounds__(kThreads)
     cut_into_blocks(const float* middles, std::uint32_t count, std::uint32_t* order) {
   constexpr unsigned kWarps = kThreads / 32;
@@ -160,7 +159,7 @@ __global__ void __launch_bounds__(kThreads)
   constexpr std::uint32_t kLastPlace = (1u << (32 - kIndexBits)) - 1;
   static_assert(kThreads == 1u << kIndexBits);
   __shared__ float middle[3][kThreads];
-  __shared__ std::uint32_t triangle[kThreads], room[kThreads];
+  __shared__ std::uint32_t triangle[kThreads], scratch[kThreads];
   __shared__ Extent of_warp[kWarps];
   const WarpTeam warp;
   const unsigned me = threadIdx.x;
@@ -169,7 +168,7 @@ __global__ void __launch_bounds__(kThreads)
     triangle[me] = order[begin + me];
     for (int k = 0; k < 3; ++k) middle[k][me] = middles[std::size_t(k) * count + triangle[me]];
   }
-  std::uint32_t index = me;  // of the triangle that is in this thread's place
+  std::uint32_t index = me;  // of the triangle at this thread's position
   __syncthreads();
   for (unsigned size = kThreads; size > kWideWidth; size /= 2) {
     const bool present = begin + index < count;
@@ -184,10 +183,10 @@ __global__ void __launch_bounds__(kThreads)
     for (int j = 0; j < 6; ++j)
       part.word[j] = warp.min(of_warp[(me / 32 & ~(warps - 1)) + (me & (warps - 1))].word[j]);
     const int axis = part.longest();
-    // Absent lanes sort behind the last triangle.
+    // Absent lanes are sorted behind the last triangle.
     const std::uint32_t place =
         present ? part.place(point[axis], axis, kLastPlace - 1) : kLastPlace;
-    index = sort_in_block(place << kIndexBits | index, size, room) & (kThreads - 1);
+    index = sort_in_block(place << kIndexBits | index, size, scratch) & (kThreads - 1);
     __syncthreads();
   }
   if (begin + me < count) order[begin + me] = triangle[index];
@@ -204,7 +203,8 @@ DeviceArray<std::uint32_t> order_triangles(Queue& queue, const double* vertices,
   launch("ordering the triangles", find_middles, blocks, kThreads, stream, vertices, triangles,
          count, middles.data(), order.data());
 
-  // Sorts the parts of `whole` triangles; cut in parts of `size`, if there is more than one.
+  // Sorts the parts of `whole` triangles; divides them into parts of `size` if there is more than
+  // one.
   const auto cut = [&](std::uint32_t whole, std::uint32_t size) {
     if (size >= count) return;
     const unsigned parts = blocks_for(count, whole);

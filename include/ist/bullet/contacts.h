@@ -31,7 +31,7 @@ struct Settings {
   };
   Response response = Response::solver;
   std::size_t patches = 8;  ///< [1, kPatches] per contact
-  /// Where an asset keeps no mesh (AssetView::has_mesh), by matched spheres.
+  /// Matched spheres replace Measure::exact if an asset has no mesh (AssetView::has_mesh).
   ContactSettings query{.measure = Measure::exact};
 
   /// law.stiffness [force/u³] is the pressure over depth, for both responses. The solver steps the
@@ -78,9 +78,9 @@ struct Contact {
   std::size_t count = 0;
   std::array<ContactPatch, Settings::kPatches> patches;
   bool flat = false;  ///< the patches are the corners of a SupportPolygon
-  /// One solid is wholly inside the other: no force of the volume leads out. The one patch has the
-  /// way out in its place: `depth` along `normal` parts them, or brings the smaller solid across
-  /// the nearest face of the other; `area` is a face of the smaller asset's size.
+  /// One solid is wholly inside the other: no force of the volume leads out. The one patch is
+  /// the exit instead: moving by `depth` along `normal` parts them, or brings the smaller solid
+  /// across the nearest face of the other; `area` is a face of the smaller asset's size.
   bool inside = false;
   /// [u] Of separate objects: they stay apart while no point moves by more than this.
   double clearance = 0;
@@ -94,7 +94,8 @@ bool find_contact(const btCollisionObject& first, const btCollisionObject& secon
 /// Narrow phase for the pairs of a dispatcher in which one object is a Shape. Each thread has its
 /// own scratch memory, so btCollisionDispatcherMt may run queries on many threads.
 ///
-/// As an action of the world (btDynamicsWorld::addAction) it stops fast bodies where they meet.
+/// Added to the world as an action (btDynamicsWorld::addAction), it stops fast bodies where they
+/// meet.
 class Contacts : public btActionInterface {
  public:
   Contacts() = default;
@@ -144,7 +145,7 @@ class Contacts : public btActionInterface {
                                                    const btCollisionObjectWrapper* a,
                                                    const btCollisionObjectWrapper* b) override;
   };
-  /// Of a pair's motion in the last step: see PairAlgorithm::share_until_impact().
+  /// The share of a pair's motion in the last step: see PairAlgorithm::share_until_impact().
   double share_of(const btCollisionAlgorithm* algorithm, const btCollisionObject& first,
                   const btCollisionObject& second, btScalar step) const;
 

@@ -63,7 +63,7 @@ std::uint32_t count_of_blocks(std::size_t blocks) {
   return static_cast<std::uint32_t>(blocks);
 }
 
-/// The header of a mesh with the counts that place_sections asks for.
+/// The header of a mesh with the counts that place_sections needs.
 MeshHeader placeable(const MeshArrays& arrays) {
   MeshHeader header = arrays.header;
   header.level[0].count = count_of_blocks(arrays.blocks.size());
@@ -73,7 +73,7 @@ MeshHeader placeable(const MeshArrays& arrays) {
   return header;
 }
 
-/// A mesh alone has no spheres, and nothing that is made of them.
+/// False if a mesh-only asset has spheres or data derived from them.
 bool holds_enough(const AssetArrays& arrays) {
   const std::uint64_t spheres = arrays.inner_spheres.size();
   return spheres == 0 ? arrays.mesh != nullptr : spheres <= kMaxSpheres;

@@ -6,14 +6,14 @@
 
 namespace ist {
 
-/// One level of a tree as it will lie in the file.
+/// One level of a tree as stored in the file.
 struct TreeLevelArrays {
   std::vector<BallBlock> blocks;
   std::vector<Origin> origins;
   std::vector<NodeBlock> nodes;  ///< empty at level 0
 };
 
-/// One tree as it will lie in the file (asset_layout.h draws it).
+/// One tree as stored in the file (see asset_layout.h).
 struct TreeArrays {
   std::vector<std::uint32_t> sphere_index;  ///< [16 · blocks of level 0]
   std::vector<float> sphere_cover;          ///< the same length; empty in the matched tree
@@ -32,9 +32,9 @@ struct DetailArrays {
   TreeArrays matched_tree;
 };
 
-/// The solid's mesh as it will lie in the file.
+/// The solid's mesh as stored in the file.
 struct MeshArrays {
-  MeshHeader header;  ///< error and rounding; offsets and counts are filled in by writing
+  MeshHeader header;             ///< error and rounding; the writer sets offsets and counts
   std::vector<double> vertices;  ///< [3 · vertices] unit frame
   std::vector<MeshShell> shells;
   std::vector<std::uint32_t> neighbours;
@@ -44,17 +44,17 @@ struct MeshArrays {
 };
 
 struct AssetArrays {
-  AssetHeader header;  ///< scalar fields; offsets, counts, magic and hash are filled in by writing
+  AssetHeader header;  ///< scalar fields; the writer sets offsets, counts, magic and hash
   std::vector<Sphere> inner_spheres;
   std::vector<float> cover_radii;       ///< the same length
   std::vector<Sphere> matched_spheres;  ///< the same length
   TreeArrays inner_tree;
   TreeArrays matched_tree;
-  std::vector<DetailArrays> details;       ///< the i-th from 1 of ⌊n / 4^i⌋ spheres
+  std::vector<DetailArrays> details;       ///< detail i (from 1) has ⌊n / 4^i⌋ spheres
   std::shared_ptr<const MeshArrays> mesh;  ///< null: none
 };
 
-/// The bytes of the asset. Throws Error unless the arrays' lengths fit each other.
+/// The bytes of the asset. Throws Error unless the arrays' lengths are consistent.
 std::vector<std::byte> asset_bytes(const AssetArrays& arrays);
 
 /// Sets the content hash of bytes that contain at least a header.

@@ -42,11 +42,11 @@ class Descriptor {
     return true;
   }
 
-  /// Here, or on closing, a full disk may show first.
+  /// A full disk may be reported only here, or on closing.
   bool sync() { return fsync(fd_) == 0; }
   bool close() { return ::close(std::exchange(fd_, -1)) == 0; }
 
-  /// Gives a file opened with O_TMPFILE a name; false if there is a file of that name.
+  /// Gives a file opened with O_TMPFILE a name; false if the name is taken.
   bool link(const std::string& name) const {
     const std::string self = "/proc/self/fd/" + std::to_string(fd_);
     return linkat(AT_FDCWD, self.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0;
@@ -56,7 +56,7 @@ class Descriptor {
   int fd_ = -1;
 };
 
-/// A name beside the target for a file that is removed unless it is moved there.
+/// A name beside the target for a file that is removed unless it is renamed to the target.
 class TemporaryName {
  public:
   explicit TemporaryName(std::string target) : target_(std::move(target)) {}
@@ -66,8 +66,8 @@ class TemporaryName {
   TemporaryName(const TemporaryName&) = delete;
   TemporaryName& operator=(const TemporaryName&) = delete;
 
-  /// Tries names until create(name) made a file. A program that was killed may have left one, and
-  /// in a container the next one has its process id.
+  /// Tries names until create(name) made a file. A killed program may have left a file, and in a
+  /// container the next program has its process id.
   template <class Create>
   bool take(const Create& create) {
     constexpr int kTries = 1000;
@@ -105,8 +105,8 @@ void write_atomically(const std::filesystem::path& path, std::span<const std::by
     return;
   }
 
-  // A file without a name vanishes with the program, however that ends. Where the file system has
-  // none (or /proc is missing, by which it gets a name), it has a temporary name from the start.
+  // An unnamed file vanishes with the program, however that ends. If the file system has none (or
+  // /proc, which gives it a name, is missing), the file has a temporary name from the start.
   const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
   Descriptor nameless(folder, O_WRONLY | O_TMPFILE | O_CLOEXEC);
   if (nameless.is_open()) {

@@ -84,7 +84,7 @@ std::unique_ptr<SolidBackend> make_host_backend(const Solid& solid) {
   return std::make_unique<HostBackend>(solid);
 }
 
-// The one place that knows which backends there are.
+// The only place that knows all backends.
 std::unique_ptr<SolidBackend> make_backend(const Solid& solid, Device device,
                                            const GpuSettings& gpu) {
   const bool on_gpu =

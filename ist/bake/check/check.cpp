@@ -27,8 +27,8 @@ Eigen::Matrix3d inertia(const AssetHeader& asset) {
   return result;
 }
 
-/// Moments of what is inside, from fixed random points of the bounding box: blind to small errors,
-/// but they see the set itself, where the winding number is ≥ 1.
+/// Moments of the inside, from fixed random points of the bounding box. Insensitive to small
+/// errors, but based on the set itself, where the winding number is ≥ 1.
 class SampledMoments {
  public:
   explicit SampledMoments(const CheckedSolid& solid) : box_(solid.bounds().sizes().prod()) {
@@ -44,9 +44,9 @@ class SampledMoments {
                       [&](std::size_t i) { inside_[i] = solid.winding(points_[i]) >= 1; });
   }
 
-  /// By how much ∫ f over the solid is off, beyond six standard deviations and `error`, as a share
-  /// of what it could be: no |f| in the bounding box is larger than `most`. Where so little of the
-  /// box is filled that 18 points are expected in it, none is once in 10⁸ times.
+  /// The error of ∫ f over the solid beyond six standard deviations and `error`, as a share of its
+  /// maximum: no |f| in the bounding box is larger than `most`. If so little of the box is filled
+  /// that 18 points are expected in it, the probability of none is 10⁻⁸.
   template <class Function>
   double off(const Function& f, double expected, double error, double most) const {
     double sum = 0, squares = 0;
@@ -109,7 +109,8 @@ Invariant check_frame(const AssetHeader& asset, const UnitFrame& frame) {
   return same.named("frame", "difference of the header's frame and the mesh's, [u]");
 }
 
-/// Volume, centre of mass and inertia are `moments`, and about those of the solid, by points.
+/// Volume, centre of mass and inertia equal `moments`, and approximately those of the solid, by
+/// points.
 std::vector<Invariant> check_mass(const AssetHeader& asset, const MeshMoments& moments,
                                   const CheckedSolid& solid) {
   Tally volume;
@@ -136,7 +137,7 @@ std::vector<Invariant> check_mass(const AssetHeader& asset, const MeshMoments& m
   return out;
 }
 
-/// Box and ball contain the surface, and all places where the solid's surface may lie.
+/// Box and ball contain the surface, and all places where the solid's surface may be.
 std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckedMesh& checked) {
   const double unit = std::ldexp(1.0, asset.exponent);
   const Vector3d origin = of_array(asset.centre);
@@ -158,7 +159,7 @@ std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckedMesh&
           ball.named("ball holds solid", "protrusion of the surface out of the ball, unit frame")};
 }
 
-/// A solid known by its signed distance, as `check` sees it. Refers to the solid.
+/// A solid with a signed distance, as `check` uses it. Refers to the solid.
 class DistanceSolid final : public CheckedSolid {
  public:
   DistanceSolid(const Solid& solid, const UnitFrame& frame)
@@ -182,8 +183,8 @@ class DistanceSolid final : public CheckedSolid {
   Eigen::AlignedBox3d bounds_;
 };
 
-/// `mesh`: what was baked, or made in the solid's place. `solid`: certifies spheres and covers;
-/// `checked`: calibrates matched spheres; of a mesh's asset they are the same.
+/// `mesh`: the baked mesh, or the mesh that approximates the solid. `solid`: certifies spheres and
+/// covers; `checked`: calibrates matched spheres; for a mesh's asset they are the same.
 std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mesh,
                                  const CheckedSolid& solid, const CheckedMesh& checked,
                                  const UnitFrame& frame, const MeshMoments& moments) {

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kTaskDepth = 3;
 constexpr double kSmallestCell = 1e-7;      // half edge, unit frame: smaller cells stay unproven
-constexpr std::size_t kEnoughFailures = 8;  // a task stops looking once it has found so many
+constexpr std::size_t kEnoughFailures = 8;  // a task stops after so many
 
 struct Cell {
   Eigen::Vector3d centre;
@@ -19,7 +19,7 @@ struct Cell {
 
 using BallList = std::vector<std::uint32_t>;
 
-/// Proves a cell covered: one cover ball contains it, or it lies outside the solid, or its eighths
+/// Proves a cell covered: one cover ball contains it, or it lies outside the solid, or its octants
 /// are proven. An uncovered point of the solid, or a cell too small to divide, is a violation.
 class CoverProof {
  public:

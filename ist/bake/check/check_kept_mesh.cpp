@@ -53,7 +53,7 @@ double count_of(DisjointSets& sets, std::uint32_t members) {
 
 using Key = std::array<double, 9>;
 
-/// Triangles by their corners, the least corner first, in order.
+/// Triangles by their corners, the smallest corner first, sorted.
 std::vector<Key> keys_of(const std::vector<CheckCorners>& triangles) {
   std::vector<Key> keys;
   for (const CheckCorners& t : triangles) {
@@ -99,7 +99,8 @@ Invariant rounding(const ClosedMesh& closed, const UnitFrame& frame, double roun
                      const Point there = frame.to_unit(vertices[v]);
                      Point off;
                      for (int k = 0; k < 3; ++k) {
-                       // x − c as two numbers without rounding; what is kept goes off the larger.
+                       // x − c as two numbers without rounding; the error is relative to the
+                       // larger.
                        const double x = vertices[v][k], c = frame.centre[k];
                        const double sum = x - c, part = sum - x;
                        const double rest = (x - (sum - part)) - (c + part);
@@ -142,8 +143,8 @@ Invariant blocks(const MeshOfAsset& mesh) {
   return tally.named("mesh blocks", "parts of a block that share no vertex − 1");
 }
 
-/// A block's list names all blocks that share a vertex with it, and no other; at a vertex of more
-/// than kMostAround blocks enough of them for all to hang together.
+/// A block's list contains all blocks that share a vertex with it, and no other; at a vertex of
+/// more than kMostAround blocks, enough of them to connect all.
 Invariant neighbours(const MeshOfAsset& mesh) {
   std::vector<std::vector<std::uint32_t>> around(mesh.header.vertex_count);
   for (std::uint32_t b = 0; b < mesh.count; ++b)
@@ -191,7 +192,7 @@ Invariant neighbours(const MeshOfAsset& mesh) {
                    "blocks that share a vertex but are not listed, or are listed but share none");
 }
 
-/// How far a block's vertices reach out of a box; ≤ 0: not at all.
+/// How far a block's vertices protrude from a box; ≤ 0: not at all.
 double out_of(const MeshOfAsset& mesh, std::size_t b, const Point& low, const Point& high) {
   double most = -HUGE_VAL;
   for (std::uint32_t i = 0; i < mesh.blocks[b].vertices; ++i) {
@@ -224,7 +225,7 @@ Invariant boxes(const AssetHeader& asset, const MeshOfAsset& mesh) {
   return sum.named("mesh boxes", "protrusion of a box's content out of the box, unit frame");
 }
 
-/// Blocks that hang together are a shell, and there are no others.
+/// Connected blocks form one shell, and there are no other shells.
 Invariant shells(const MeshOfAsset& mesh) {
   DisjointSets groups(mesh.header.vertex_count);
   for (std::size_t b = 0; b < mesh.count; ++b)

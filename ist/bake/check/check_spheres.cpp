@@ -19,8 +19,8 @@ double volume_of(const Sphere* spheres, std::size_t count) {
 
 double distance(const Sphere& a, const Sphere& b) { return (centre(a) - centre(b)).norm(); }
 
-/// Calls visit(i, j) for every pair whose extents along x overlap, j after i in that order. All
-/// pairs are looked at; those that are not visited lie apart along x.
+/// Calls visit(i, j) for every pair whose extents along x overlap, j after i in that order. Pairs
+/// that are not visited are apart along x.
 template <class Visit>
 Tally sweep(const Sphere* spheres, std::size_t count, const Visit& visit) {
   std::vector<std::uint32_t> order(count);
@@ -94,7 +94,7 @@ std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t det
   const Sphere* const matched = matched_spheres(asset, detail);
   const double stated =
       detail == 0 ? asset.protrusion : at<DetailLevel>(asset, asset.details)[detail - 1].protrusion;
-  // The mesh stands for a solid whose surface may be this far from it.
+  // The mesh approximates a solid whose surface may be this far from it.
   const double protrusion = stated - asset.polygonise_error;
   std::vector<Invariant> out;
   Tally sum;

@@ -19,7 +19,7 @@ struct Tally {
 
   void add(double value, std::size_t index) {
     ++checked;
-    if (!(value <= 0)) ++violations;  // NaN is one too
+    if (!(value <= 0)) ++violations;  // including NaN
     if (!(value <= worst)) {
       worst = value;
       where = index;
@@ -57,26 +57,27 @@ Tally tally_all(std::size_t count, const Visit& visit) {
 
 inline Eigen::Vector3d centre(const Sphere& s) { return {s.x, s.y, s.z}; }
 
-/// One tree against the table of its spheres: leaves, balls, cover balls, volumes and κ. `covers`
-/// is null for the matched tree.
+/// Compares one tree with the table of its spheres: leaves, balls, cover balls, volumes and κ.
+/// `covers` is null for the matched tree.
 std::vector<Invariant> check_tree(const AssetHeader& asset, const TreeHeader& tree,
                                   const Sphere* spheres, const float* covers,
                                   const std::string& name);
 
-/// Inner spheres lie in the solid and apart; covers contain spheres.
+/// Inner spheres lie in the solid and are disjoint; covers contain spheres.
 std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSolid& checked);
 
-/// The matched spheres of a detail (0: the finest) stand for the solid. Names start with `name`.
+/// The matched spheres of a detail (0: the finest) match the solid. Names start with `name`.
 std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t detail,
                                      const CheckedMesh& checked, const std::string& name);
 
 /// Every point of the solid lies in some cover ball: proven by subdivision.
 Invariant check_cover(const AssetHeader& asset, const CheckedSolid& checked);
 
-/// The mesh of an asset that has one, against the mesh that was baked and by itself: its triangles
-/// and errors, closed, its blocks, neighbours, shells and boxes.
+/// Compares the mesh of an asset that has one with the baked mesh, and checks it alone: its
+/// triangles and errors, closed, its blocks, neighbours, shells and boxes.
 ///
-/// `baked`: what was baked, or made in the solid's place; `checked`: the same in `frame`.
+/// `baked`: the baked mesh, or the mesh that approximates the solid; `checked`: the same in
+/// `frame`.
 std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMesh& baked,
                                        const UnitFrame& frame, const CheckedMesh& checked);
 

@@ -47,7 +47,7 @@ class TreeCheck {
     return worst;
   }
 
-  /// Nodes of level k ≥ 1, each above 16^k spheres; the root stands as one more level.
+  /// Nodes of level k ≥ 1, each above 16^k spheres; the root counts as one more level.
   std::size_t nodes(std::size_t k) const { return k == levels() ? 1 : tree_.level[k - 1].count; }
 
   std::size_t node_of(std::size_t lane, std::size_t k) const {
@@ -88,10 +88,11 @@ class TreeCheck {
     return sum;
   }
 
-  /// Most spheres that cover one point: the deepest region is an intersection of balls, so one of
-  /// its corners (where three spheres meet), or a point of a rim (where two do), or the centre of a
-  /// sphere that lies in all others, is as deep. Counts these points in the smallest sphere of the
-  /// region, node by node. A different proof from the one by subdivision that made κ.
+  /// Finds the maximum number of spheres that cover one point. The deepest region is an
+  /// intersection of balls, so one of its corners (where three spheres meet), or a point of a rim
+  /// (where two do), or the centre of a sphere that lies in all others, is as deep. Counts these
+  /// points in the smallest sphere of the region, node by node. This proof is independent of the
+  /// subdivision that computed κ.
   void overlap_at(std::size_t lane, const std::vector<std::uint32_t>& near, Tally& tally) const;
 
  private:
@@ -132,7 +133,7 @@ void TreeCheck::overlap_at(std::size_t lane, const std::vector<std::uint32_t>& n
   const Eigen::Vector3d c = centre(home);
   count_cover(c, std::array{lane}, larger, tally);
   for (std::size_t a = 0; a < larger.size(); ++a) {
-    // Circle of home's sphere and a's: centre m, axis, radius ρ.
+    // The circle of home's sphere and a's: centre m, axis, radius ρ.
     const Sphere& sa = sphere(larger[a]);
     const Eigen::Vector3d to_a = centre(sa) - c;
     const double da = to_a.norm();
@@ -221,7 +222,7 @@ std::vector<Invariant> check_tree(const AssetHeader& asset, const TreeHeader& tr
               const double r = check.sphere(lane).r;
               sum += 4 * std::numbers::pi / 3 * (r * r * r);
             }
-            // Nodes round up to float; the whole sum is a double.
+            // Nodes round up to float; the total is a double.
             const bool root = k == check.levels();
             tally.add((sum - node.volume) / sum - (root ? 1e-12 : 0), number);
             tally.add((node.volume - sum) / sum - (root ? 1e-12 : 2e-7), number);

@@ -27,7 +27,7 @@ const std::array<Eigen::Vector3d, 3>& ray_frame() {
   return frame;
 }
 
-/// Sign of a determinant whose rounding error stays below 1e-14 of the products in it; 0 if open.
+/// Sign of a determinant whose rounding error stays below 1e-14 of its products; 0 if undecided.
 int certain_sign(double determinant, double magnitude) {
   if (std::abs(determinant) <= 1e-14 * magnitude) return 0;
   return determinant > 0 ? 1 : -1;
@@ -48,7 +48,7 @@ bool ray_meets(const Eigen::Vector3d& p, const Eigen::AlignedBox3d& box) {
 
 enum class Hit { no, front, back, open };
 
-/// Whether the ray from p leaves (front) or enters (back) through a triangle.
+/// Determines whether the ray from p leaves (front) or enters (back) through a triangle.
 Hit cross(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& triangle) {
   std::array<Eigen::Vector3d, 3> t;  // in the ray's frame, p at the origin
   double size = 0;
@@ -57,8 +57,8 @@ Hit cross(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& triang
     t[k] = {d.dot(ray_frame()[0]), d.dot(ray_frame()[1]), d.dot(ray_frame()[2])};
     size = std::max(size, d.lpNorm<1>());
   }
-  bool left = true;   // the ray lies left of every edge, or may
-  bool right = true;  // right of every edge, or may
+  bool left = true;   // the ray is, or may be, left of every edge
+  bool right = true;  // it is, or may be, right of every edge
   bool certain = true;
   for (std::size_t k = 0; k < 3; ++k) {
     const Eigen::Vector3d& a = t[k];
@@ -72,15 +72,15 @@ Hit cross(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& triang
   if (t[0].z() < -1e-14 * size && t[1].z() < -1e-14 * size && t[2].z() < -1e-14 * size)
     return Hit::no;
   if (!certain) return Hit::open;
-  // Volume of (p, a, b, c): of the edges' sign if the triangle is ahead of p.
+  // Volume of (p, a, b, c): it has the edges' sign if the triangle is ahead of p.
   const int side = certain_sign(t[0].dot(t[1].cross(t[2])), size * size * size);
   if (side == 0) return Hit::open;
   if (left) return side > 0 ? Hit::front : Hit::no;
   return side < 0 ? Hit::back : Hit::no;
 }
 
-/// The edges, and the foot of the perpendicular where that lies inside. Every candidate is a point
-/// of the triangle, so that a sliver's poor normal cannot make the distance too small.
+/// The edges, and the foot of the perpendicular if that lies inside. Every candidate is a point of
+/// the triangle, so that a sliver's inaccurate normal cannot make the distance too small.
 double squared_distance_to_triangle(const Eigen::Vector3d& p, const CheckedMesh::Corners& t) {
   double best = std::min({squared_distance_to_segment(p, t[0], t[1]),
                           squared_distance_to_segment(p, t[1], t[2]),

@@ -5,12 +5,13 @@
 
 namespace ist {
 
-/// A solid as `check` asks it, unit frame. Immutable.
+/// The functions of a solid that `check` uses, unit frame. Immutable.
 class CheckedSolid {
  public:
   virtual ~CheckedSolid() = default;
 
-  /// Distance to the surface, or less where it is not known; any value ≥ limit beyond `limit`.
+  /// Distance to the surface, or a lower bound if it is not known; any value ≥ limit beyond
+  /// `limit`.
   virtual double distance(const Eigen::Vector3d& p, double limit) const = 0;
 
   /// Winding number of a point off the surface: ≥ 1 inside.
@@ -19,22 +20,22 @@ class CheckedSolid {
   virtual const Eigen::AlignedBox3d& bounds() const = 0;  ///< contains the whole solid
 };
 
-/// A mesh's surface as `check` sees it: plain, in double, and of its own making, so that a mistake
-/// in the solid that packing asked is not repeated here. Immutable.
+/// A mesh's surface for `check`: simple, in double, and an independent implementation, so that a
+/// mistake in the solid that packing used is not repeated. Immutable.
 class CheckedMesh final : public CheckedSolid {
  public:
   using Corners = std::array<Eigen::Vector3d, 3>;
 
   CheckedMesh(const ClosedMesh& mesh, const UnitFrame& frame);
 
-  /// Unit frame, to the nearest triangle; once nothing is nearer than `limit`, any value ≥ limit.
+  /// Unit frame, to the nearest triangle; if nothing is nearer than `limit`, any value ≥ limit.
   double distance(const Eigen::Vector3d& p, double limit) const override;
 
-  /// In an order of its own.
+  /// The triangles in internal order.
   const std::vector<Corners>& triangles() const { return triangles_; }
 
-  /// Winding number of a point off the surface, by a ray in a direction that no mesh was modelled
-  /// along; where rounding leaves a sign open, by the sum of all solid angles.
+  /// Winding number of a point off the surface, by a ray in a direction unlikely to occur in a
+  /// model; if rounding leaves a sign undecided, by the sum of all solid angles.
   int winding(const Eigen::Vector3d& p) const override;
 
   const Eigen::AlignedBox3d& bounds() const override { return bounds_; }

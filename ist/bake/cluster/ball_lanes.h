@@ -14,8 +14,7 @@ struct Ball {
 };
 
 /// The smallest ball that contains the given balls, to about 1e-9 of its radius. Deterministic;
-/// only
-/// + − × ÷ sqrt. The set must not be empty.
+/// uses only + − × ÷ sqrt. The set must not be empty.
 Ball bounding_ball(std::span<const Ball> balls);
 
 /// Smallest radius about (x, y, z) that contains the ball, before rounding.
@@ -26,13 +25,13 @@ inline double reach(double x, double y, double z, const Ball& ball) {
   return std::sqrt(dx * dx + dy * dy + dz * dz) + ball.r;
 }
 
-/// κ of every node of a tree: certified upper bounds on how many of its spheres cover one point.
-/// `spheres` lie in tree order; `balls[k]` are the balls around each 16^(k+1) consecutive ones.
-/// Answers bounds of the same shape as `balls`, then one entry more: {κ of the whole set}.
+/// κ of every node of a tree: certified upper bounds on the number of its spheres that cover one
+/// point. `spheres` are in tree order; `balls[k]` are the balls around each 16^(k+1) consecutive
+/// ones. Returns bounds of the same shape as `balls`, followed by one entry {κ of the whole set}.
 std::vector<std::vector<float>> overlap_bounds(std::span<const Ball> spheres,
                                                const std::vector<std::vector<Ball>>& balls);
 
-/// One to sixteen balls, coordinate by coordinate; lanes behind them repeat the first.
+/// One to sixteen balls, coordinate by coordinate; unused lanes repeat the first.
 struct BallLanes {
   alignas(64) std::array<double, kWidth> x, y, z, r;
   std::size_t count = 0;
@@ -46,7 +45,7 @@ struct BallLanes {
     r[lane] = ball.r;
   }
 
-  /// The balls are lanes 0 … balls − 1, which are put already.
+  /// Finishes a set whose balls are in lanes 0 … balls − 1.
   void close(std::size_t balls) {
     count = balls;
     for (std::size_t lane = balls; lane < kWidth; ++lane) put(lane, ball(0));
@@ -57,15 +56,15 @@ inline constexpr int kMaxSupport =
     4;  ///< a smallest ball in space touches at most four from inside
 inline constexpr double kBallSlack = 1e-10;  ///< relative to a ball's radius
 
-/// Balls that a smallest ball touches.
+/// The balls that touch a smallest ball.
 struct Support {
   std::array<Ball, kMaxSupport> balls;
   int count = 0;
 };
 
 /// The step from one smallest ball to the next: `ball` becomes the smallest one of the support and
-/// `added`, which it does not contain, and `support` what that touches. False, and no change, if
-/// there is none.
+/// `added`, which it does not contain, and `support` the balls that touch it. False, without a
+/// change, if there is none.
 bool grow(Support& support, const Ball& added, Ball& ball);
 
 }  // namespace ist

@@ -1,4 +1,4 @@
-// The walk to the smallest ball around others: included once a target.
+// The iteration to the smallest ball around others: included once per target.
 
 #if defined(IST_BAKE_BALL_WALK_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_BAKE_BALL_WALK_INL_H_
@@ -37,7 +37,7 @@ HWY_INLINE BallVector distances(BallVector dx, BallVector dy, BallVector dz) {
   return hn::Sqrt((dx * dx + dy * dy) + dz * dz);
 }
 
-/// How far the balls from lane i on reach from the centre of another.
+/// The reach of the balls from lane i on from the centre of another.
 HWY_INLINE BallVector reaches_from(const Ball& centre, const BallLanes& balls, std::size_t i) {
   const BallTag d;
   return distances(hn::Load(d, balls.x.data() + i) - hn::Set(d, centre.x),
@@ -46,7 +46,7 @@ HWY_INLINE BallVector reaches_from(const Ball& centre, const BallLanes& balls, s
          hn::Load(d, balls.r.data() + i);
 }
 
-/// The place of the ball that reaches farthest from a centre; of equals the first.
+/// The index of the ball that reaches farthest from a centre; among equals the first.
 struct Farthest {
   std::size_t place = 0;
   bool found = false;
@@ -71,7 +71,7 @@ HWY_INLINE Farthest farthest_from(const Ball& centre, const BallLanes& balls, do
   return {place, true};
 }
 
-/// The same of many balls, at least as many as a vector has lanes.
+/// The same for many balls, at least as many as a vector has lanes.
 HWY_INLINE Farthest farthest_from(const Ball& centre, std::span<const Ball> balls, double& worst) {
   const BallTag d;
   const std::size_t lanes = hn::Lanes(d);
@@ -97,8 +97,8 @@ HWY_INLINE std::size_t count_of(const BallLanes& balls) { return balls.count; }
 HWY_INLINE std::size_t count_of(std::span<const Ball> balls) { return balls.size(); }
 
 /// The smallest ball that contains the given ones. It grows with every ball that joins the support,
-/// so the loop ends; the cap on it is only for ties within rounding. The first ball with
-/// enough(radius) is returned at once.
+/// so the loop ends; the limit only handles ties within rounding. The first ball with
+/// enough(radius) is returned immediately.
 template <class Balls, class Enough>
 Ball smallest_ball(const Balls& balls, const Enough& enough) {
   Support support;
@@ -114,7 +114,7 @@ Ball smallest_ball(const Balls& balls, const Enough& enough) {
     if (!farthest.found) return current;
     Ball next = current;
     if (!grow(support, ball_at(balls, farthest.place), next) || next.r <= current.r) {
-      current.r = worst;  // degenerate to rounding: contain it from the present centre
+      current.r = worst;  // degenerate to rounding: contain the ball from the present centre
       return current;
     }
     current = next;

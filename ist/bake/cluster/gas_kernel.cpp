@@ -19,7 +19,7 @@ using Vector = hn::Vec<Tag>;
 using FloatTag = hn::CappedTag<float, kWidth>;
 using IntTag = hn::RebindToSigned<FloatTag>;
 
-/// Squared distances of a ball's centre; infinite behind the prototypes.
+/// Squared distances of a ball's centre; infinite in unused prototypes.
 HWY_INLINE void measure(const Ball& ball, const Prototypes& at, PrototypeValues& distance2) {
   const Tag d;
   const Vector far = hn::Set(d, std::numeric_limits<double>::infinity());
@@ -36,7 +36,7 @@ HWY_INLINE void measure(const Ball& ball, const Prototypes& at, PrototypeValues&
 using Keys = std::array<float, kWidth>;
 using Ranks = std::array<std::int32_t, kWidth>;
 
-/// In float, whose rounding keeps the order of all that it does not make equal.
+/// Rounds to float, which keeps the order except for new ties.
 HWY_INLINE void round(const PrototypeValues& distance2, Keys& keys) {
   const Tag d;
   const hn::Rebind<float, Tag> half;
@@ -44,7 +44,7 @@ HWY_INLINE void round(const PrototypeValues& distance2, Keys& keys) {
     hn::Store(hn::DemoteTo(half, hn::Load(d, distance2.data() + p)), half, keys.data() + p);
 }
 
-/// How many are less, for each. Counting beats sorting: no branch depends on the data.
+/// The number of smaller keys, for each. Counting beats sorting: no branch depends on the data.
 HWY_INLINE void rank(const Keys& keys, std::size_t count, Ranks& ranks) {
   const FloatTag df;
   const IntTag di;

@@ -18,12 +18,12 @@ namespace ist {
 
 inline double square_of(double x) { return x * x; }
 
-/// A little more than the radius: errs on the side of meeting, by more than rounding.
+/// Slightly more than the radius: errs towards overlap, by more than rounding.
 inline double enlarged(double radius) { return radius * (1 + 1e-9) + 1e-12; }
 
 struct CoveringBalls {
   std::vector<double> x, y, z;
-  std::vector<double> reach2;   ///< a little more than the radius, squared
+  std::vector<double> reach2;   ///< slightly more than the radius, squared
   std::vector<double> radius2;  ///< the radius squared
 
   std::size_t size() const { return x.size(); }
@@ -59,11 +59,11 @@ constexpr std::size_t kHalves = 8;
 struct Box {
   double x, y, z, half;
   int depth;
-  int passed;        ///< boxes that were not worth keeping, whose turn is just before this one's
+  int passed;        ///< boxes that were dropped and preceded this one in the order
   std::size_t most;  ///< balls that meet it
 };
 
-/// Whether balls and boxes meet, one in each lane.
+/// Tests whether balls and boxes meet, one in each lane.
 HWY_INLINE hn::Mask<Tag> meets(Vector dx, Vector dy, Vector dz, Vector half, Vector reach2) {
   const Vector none = hn::Zero(Tag());
   dx = hn::Max(hn::Abs(dx) - half, none);
@@ -72,7 +72,7 @@ HWY_INLINE hn::Mask<Tag> meets(Vector dx, Vector dy, Vector dz, Vector half, Vec
   return (dx * dx + dy * dy) + dz * dz <= reach2;
 }
 
-/// The eight halves of a box, and what meets them.
+/// The eight octants of a box, and the balls that meet them.
 class Halves {
  public:
   explicit Halves(const Box& box) : half_(box.half / 2) {
@@ -102,7 +102,7 @@ class Halves {
     }
   }
 
-  /// How many of the others meet half c; 0 where `home` does not.
+  /// The number of other balls that meet octant c; 0 if `home` does not.
   std::size_t most(std::size_t c) const { return static_cast<std::size_t>(counts_[c]); }
   Box box(std::size_t c, int depth) const {
     return {x_[c], y_[c], z_[c], half_, depth, 0, most(c)};
@@ -122,7 +122,7 @@ std::size_t covering(const CoveringBalls& others, const Box& box) {
   return count;
 }
 
-/// Upper bound on how many of `others`, each of which meets `home`, cover one point of it.
+/// Upper bound on the number of `others`, each of which meets `home`, that cover one point of it.
 std::size_t deepest(const Ball& home, const CoveringBalls& others) {
   if (others.size() == 0) return 0;
   const auto in_home = [&](const Box& box) {
@@ -142,7 +142,7 @@ std::size_t deepest(const Ball& home, const CoveringBalls& others) {
       if (box.most <= found) continue;
     }
     if (box.depth == kMaxDepth || spent >= kBoxBudget) {
-      found = box.most;  // gives up here: the bound stays true
+      found = box.most;  // gives up: the bound remains valid
       continue;
     }
     Halves halves(box);
@@ -175,8 +175,8 @@ namespace {
 
 HWY_EXPORT(deepest);
 
-// A point that many spheres cover lies in the smallest of them: it is enough to look, inside every
-// sphere, for the point that most larger ones cover.
+// A point that many spheres cover lies in the smallest of them. So it suffices to search, inside
+// every sphere, for the point that most larger ones cover.
 
 class OverlapBounds {
  public:
@@ -216,7 +216,7 @@ class OverlapBounds {
     return spheres_[j].r != spheres_[i].r ? spheres_[j].r > spheres_[i].r : j < i;
   }
 
-  /// Larger spheres that overlap sphere i, from the children of one node down.
+  /// Collects larger spheres that overlap sphere i, from the children of one node down.
   void collect(std::size_t i, std::size_t level, std::size_t node,
                std::vector<std::size_t>& out) const {
     const std::size_t begin = level == balls_.size() ? 0 : node * kWidth;

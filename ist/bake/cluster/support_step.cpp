@@ -41,16 +41,16 @@ bool solve(double (&g)[3][3], double (&a)[3], double (&b)[3], double& pivots) {
   return true;
 }
 
-/// A ball that touches some balls from inside, its centre in the affine hull of theirs.
+/// A ball that touches some balls from inside, with its centre in the affine hull of theirs.
 struct TangentBall {
   Ball ball;
   /// The centre is Σ share · centre; the shares' sum is 1.
   std::array<double, kMaxSupport> shares{};
-  /// No centre is nearer to the affine hull of the others than this, squared.
+  /// Lower bound of the squared distance of any centre from the affine hull of the others.
   double height2 = std::numeric_limits<double>::infinity();
 };
 
-/// |c − p_i| = R − r_i for all i ≤ N. With p_0 as origin the centre is u + R v, both linear
+/// Solves |c − p_i| = R − r_i for all i ≤ N. With p_0 as origin the centre is u + R v, both linear
 /// solutions, and |u + R v| = R − r_0 gives R. False if there is none.
 template <int N>
 bool tangent_ball(const std::array<Ball, kMaxSupport>& balls, TangentBall& out) {
@@ -76,7 +76,8 @@ bool tangent_ball(const std::array<Ball, kMaxSupport>& balls, TangentBall& out) 
   }
   double pivots = 1;
   if (!solve<N>(g, a, b, pivots)) return false;
-  // A Gram determinant is a height squared times what is below it, which is at most its lengths'.
+  // A Gram determinant is a squared height times the determinant below it, which is at most the
+  // product of lengths.
   if (N > 0) out.height2 = pivots * least2 / lengths2;
   double u[3] = {};
   double v[3] = {};
@@ -135,14 +136,14 @@ class SupportStep {
  public:
   SupportStep(const Support& support, const Ball& added) : support_(support), added_(added) {}
 
-  /// The smallest ball of the support and `added`, outside it. False if there is none.
+  /// Finds the smallest ball of the support and `added`, outside it. False if there is none.
   bool run() { return guess() || try_all(); }
 
   const Support& support() const { return best_support_; }
   const Ball& ball() const { return best_; }
 
  private:
-  /// `added` and those of the support whose bits are set.
+  /// `added` and the balls of the support whose bits are set.
   Support chosen(unsigned subset) const {
     Support trial;
     trial.balls[0] = added_;
@@ -162,7 +163,7 @@ class SupportStep {
   bool try_all() {
     best_.r = std::numeric_limits<double>::infinity();
     for (unsigned subset = 0; subset < (1u << support_.count); ++subset) {
-      if (subset == (1u << kMaxSupport) - 1) continue;  // with `added` one too many
+      if (subset == (1u << kMaxSupport) - 1) continue;  // too many balls with `added`
       const Support trial = chosen(subset);
       TangentBall tangent;
       if (!tangent_ball(trial, tangent) || tangent.ball.r >= best_.r) continue;
@@ -185,7 +186,7 @@ class SupportStep {
     return false;
   }
 
-  /// Leaves out balls that pull the centre in the wrong direction, one after the other.
+  /// Removes balls that pull the centre in the wrong direction, one after the other.
   bool follow(unsigned subset) {
     for (;;) {
       const Support trial = chosen(subset);
@@ -199,15 +200,15 @@ class SupportStep {
       if (tangent.shares[static_cast<std::size_t>(least)] >= kSureShare)
         return accept(trial, tangent, subset);
       if (least == 0 || tangent.shares[static_cast<std::size_t>(least)] > 0) return false;
-      unsigned rest = subset;  // least is the least-th of the set bits
+      unsigned rest = subset;  // `least` is an index among the set bits
       for (int i = 1; i < least; ++i) rest &= rest - 1;
       subset &= ~(rest & (~rest + 1));
     }
   }
 
-  /// A ball whose centre lies well within those that it touches is their smallest; if it also
-  /// contains the others with a margin, it is the smallest of all. A subset that lacks one of the
-  /// former, or has one of the latter, has a centre so far away that its ball is larger or lacks
+  /// A ball whose centre lies well within the balls that it touches is their smallest; if it also
+  /// contains the others with a margin, it is the smallest of all. A subset without one of the
+  /// former, or with one of the latter, has a centre so far away that its ball is larger or misses
   /// one.
   bool accept(const Support& trial, const TangentBall& tangent, unsigned subset) {
     const Ball& ball = tangent.ball;
@@ -220,7 +221,7 @@ class SupportStep {
       const Ball& other = support_.balls[static_cast<std::size_t>(i)];
       const bool is_touched = (subset >> i & 1u) != 0;
       if (is_touched ? !holds(ball, other)
-                     : !(reach(ball.x, ball.y, ball.z, other) < ball.r * (1 - kSureRoom)))
+                     : !(reach(ball.x, ball.y, ball.z, other) < ball.r * (1 - kSureMargin)))
         return false;
     }
     best_ = ball;
@@ -228,7 +229,7 @@ class SupportStep {
     return true;
   }
 
-  static constexpr double kSureShare = 1e-2, kSureTouch = 1e-9, kSureRoom = 1e-3;
+  static constexpr double kSureShare = 1e-2, kSureTouch = 1e-9, kSureMargin = 1e-3;
 
   const Support& support_;
   const Ball& added_;

@@ -26,7 +26,7 @@ void measure_group(SwapGroup& group) {
   for (std::size_t i = 0; i < members.count; ++i) {
     Ball& without = group.without[i];
     without = group.ball;
-    // Only a ball that touches the bounding ball from inside contains it at its size.
+    // Only a ball that touches the bounding ball from inside can contain it at its size.
     if (members.count == 1) {
       without.r = 0;
     } else if (reach(group.ball.x, group.ball.y, group.ball.z, members.ball(i)) >=
@@ -42,10 +42,10 @@ void measure_group(SwapGroup& group) {
   }
 }
 
-/// Lower bounds of a group's radius once a ball joins it in place of a member.
+/// Lower bounds of a group's radius after a ball replaces a member.
 struct Fit {
   double farthest = 0;  ///< half of the chord across the ball and the member it is farthest from
-  double next = 0;      ///< and the member after that
+  double next = 0;      ///< and the next farthest member
   std::size_t member = 0;
 
   Fit() = default;
@@ -78,14 +78,14 @@ struct Fit {
   }
 };
 
-/// Lower bounds of a group's cost once a ball joins it in place of a member, for the members of
-/// another group. A ball of radius R that contains a set whose smallest ball has radius r has its
-/// centre within √(R² − r²) of that one's: so R ≥ (D + r²/D) / 2 if it contains a ball, too, that
-/// reaches D from there.
+/// Lower bounds of a group's cost after a ball replaces a member, for the members of another group.
+/// A ball of radius R that contains a set whose smallest ball has radius r has its centre within
+/// √(R² − r²) of that one's. So R ≥ (D + r²/D) / 2 if it also contains a ball that reaches D from
+/// there.
 class JoinCosts {
  public:
   JoinCosts(const SwapGroup& group, const BallLanes& added, double reach) : group_(group) {
-    if (group.members.count == 1) {  // no bound on the centre is left
+    if (group.members.count == 1) {  // there is no bound on the centre
       of_ball_.fill(0);
       return;
     }
@@ -95,12 +95,12 @@ class JoinCosts {
     }
   }
 
-  /// In place of one member, by what joins.
+  /// Costs by the ball that joins, for one replaced member.
   const LaneValues& row(std::size_t left_out) const {
     return (group_.touching >> left_out & 1u) != 0 ? of_touching_[left_out] : of_ball_;
   }
 
-  /// Costs for a ball that joins, by the member whose place it takes.
+  /// Costs by the replaced member, for one ball that joins.
   LaneValues column(std::size_t joining) const {
     LaneValues costs;
     costs.fill(of_ball_[joining]);
@@ -113,13 +113,13 @@ class JoinCosts {
  private:
   static void fill(const Ball& rest, const BallLanes& added, double reach, LaneValues& costs) {
     const BallTag d;
-    // Balls are as small as can be to rounding, or a little larger where they touch too many.
-    constexpr double kRoom = 1 - 1e-4, kSmallest = 1e-150;
+    // Balls are minimal to rounding, or slightly larger if they touch too many.
+    constexpr double kSlack = 1 - 1e-4, kSmallest = 1e-150;
     const BallVector r = hn::Set(d, rest.r),
                      least = hn::Set(d, rest.r > kSmallest ? rest.r : kSmallest);
     for (std::size_t i = 0; i < kWidth; i += hn::Lanes(d)) {
       const BallVector far = hn::Max(reaches_from(rest, added, i), least);
-      const BallVector radius = (far + r * (r / far)) * hn::Set(d, 0.5 * kRoom);
+      const BallVector radius = (far + r * (r / far)) * hn::Set(d, 0.5 * kSlack);
       const BallVector with_reach = radius + hn::Set(d, reach);
       hn::StoreU(with_reach * with_reach * with_reach, d, costs.data() + i);
     }
@@ -183,11 +183,10 @@ class SwapSearch {
     return r * r * r;
   }
 
-  /// Falls as either cost rises, rounding included.
+  /// Monotone in both costs, rounding included.
   double gain(double cost_a, double cost_b) const { return now_ - cost_a - cost_b; }
   bool gains(double cost_a, double cost_b) const { return gain(cost_a, cost_b) > best_.gain; }
 
-  /// One bit a lane.
   std::uint32_t gaining(const LaneValues& costs_a, const LaneValues& costs_b) const {
     const BallTag d;
     std::uint32_t bits = 0;
@@ -199,7 +198,7 @@ class SwapSearch {
     return bits;
   }
 
-  /// One bit a member of b: no bound yet says that it is in vain to swap it.
+  /// One bit a member of b: no bound shows that exchanging it is useless.
   std::uint32_t promising(double without_a, const Fit& into_b) const {
     const BallTag d;
     const std::size_t lanes = hn::Lanes(d);
@@ -210,7 +209,7 @@ class SwapSearch {
     across[into_b.member] = into_b.next;
     std::uint32_t bits = 0;
     for (std::size_t t = 0; t < kWidth; t += lanes) {
-      // Behind the members nothing is to be cubed: it would overflow.
+      // Unused lanes are excluded: cubes would overflow.
       const auto is_member = t + lanes <= b_.members.count
                                  ? hn::FirstN(d, lanes)
                                  : hn::FirstN(d, t < b_.members.count ? b_.members.count - t : 0);
@@ -223,7 +222,7 @@ class SwapSearch {
     return bits;
   }
 
-  /// The cost of a group with another ball in place of a member, or one that is too high already.
+  /// The cost of a group after a ball replaces a member, or a bound that is already too high.
   template <class Gains>
   double cost_with(const SwapGroup& group, std::size_t left_out, const Ball& added,
                    const Gains& gains) const {

@@ -23,8 +23,8 @@ std::vector<Ball> to_balls(std::span<const Sphere> spheres) {
 }
 
 /// An origin for coordinates in [low, high] such that x − origin is exact in float for every float
-/// x between them: within a factor of two by Sterbenz' lemma; otherwise zero, when the coordinates
-/// are no larger than twice their spread, so that zero is as near as any.
+/// x between them: within a factor of two by Sterbenz' lemma; otherwise zero, as then the
+/// coordinates are no larger than twice their spread, so that zero is near enough.
 double exact_origin(float low, float high) {
   const bool same_sign = (low > 0 && high > 0) || (low < 0 && high < 0);
   const float smaller = std::fmin(std::fabs(low), std::fabs(high));
@@ -33,7 +33,7 @@ double exact_origin(float low, float high) {
   return static_cast<double>(low + (high - low) / 2);
 }
 
-/// Packs float balls, sixteen to a block; origin + offset is every centre exactly.
+/// Packs float balls, sixteen to a block; origin + offset is exactly every centre.
 void fill_blocks(std::span<const Sphere> balls, std::vector<BallBlock>& blocks,
                  std::vector<Origin>& origins) {
   const std::size_t count = (balls.size() + kWidth - 1) / kWidth;
@@ -63,7 +63,7 @@ void fill_blocks(std::span<const Sphere> balls, std::vector<BallBlock>& blocks,
   }
 }
 
-/// A float ball around balls; the centre is rounded first, the radius about it rounded up.
+/// A float ball around balls; the centre is rounded first, then the radius about it is rounded up.
 Sphere ball_around(std::span<const Ball> balls) {
   const Ball ball = bounding_ball(balls);
   Sphere out = {static_cast<float>(ball.x), static_cast<float>(ball.y), static_cast<float>(ball.z),

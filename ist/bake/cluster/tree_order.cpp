@@ -11,13 +11,13 @@
 namespace ist {
 namespace {
 
-constexpr std::size_t kNeighbours = 8;  ///< groups that a group may trade with
+constexpr std::size_t kNeighbours = 8;  ///< groups with which a group may exchange members
 constexpr int kMaxRounds = 40;
 /// s, relative to the mean radius of the groups' balls before any swap.
 constexpr double kReach = 0.25;
 constexpr double kLeastGain = 1e-4;  ///< relative to the two groups' cost; smaller ones are noise
 
-/// Two groups, and the best swap between them as they are now.
+/// Two groups, and the best current swap between them.
 struct Pair {
   std::uint32_t a = 0, b = 0;
   MemberSwap swap = {};
@@ -58,7 +58,7 @@ class GroupSwaps {
         const double of_p = pairs_[p].swap.gain, of_q = pairs_[q].swap.gain;
         return of_p != of_q ? of_p > of_q : p < q;
       });
-      // The best swap of each group; what it blocks is found again in the next round.
+      // Takes the best swap of each group; the next round finds the blocked ones again.
       std::fill(touched.begin(), touched.end(), 0);
       of_round.clear();
       for (const std::uint32_t p : gaining) {
@@ -83,14 +83,14 @@ class GroupSwaps {
     measure_group(groups_[g]);
   }
 
-  /// Which of the group's members stays.
+  /// The member of the group that stays.
   std::size_t pinned(std::uint32_t g) const {
     const bool holds_last = std::size_t{g} + 1 == groups_.size();
     return last_stays_ && holds_last ? groups_[g].members.count - 1 : kNoMember;
   }
 
   void find_pairs() {
-    // Along x: what is further away in x alone need not be looked at.
+    // Sorted along x, so that groups further away in x alone are skipped.
     std::vector<std::uint32_t> along(groups_.size());
     std::iota(along.begin(), along.end(), 0u);
     const auto x = [&](std::size_t k) { return groups_[along[k]].ball.x; };
@@ -140,9 +140,9 @@ class GroupSwaps {
   double reach_ = 0;
 };
 
-/// Swaps balls between near groups of 16 consecutive entries of `order` while that shrinks
-/// Σ (R + s)³ over the groups' bounding balls; s stands for what a query brings along. The last
-/// entry keeps its place if `last_stays`. Deterministic for any number of threads.
+/// Swaps balls between neighbouring groups of 16 consecutive entries of `order` while that shrinks
+/// Σ (R + s)³ over the groups' bounding balls; s stands for the size of the query's partner. The
+/// last entry stays if `last_stays`. Deterministic for any number of threads.
 void improve_groups(std::span<const Ball> balls, bool last_stays,
                     std::vector<std::uint32_t>& order) {
   if (order.size() > kWidth) GroupSwaps(balls, last_stays, order).run();
@@ -163,9 +163,9 @@ void in_parts(std::size_t size, const Work& work) {
     tbb::parallel_for(std::size_t{0}, parts, part);
 }
 
-/// Distributes a range of sorted balls evenly among prototypes: first in the prototypes' order, the
-/// nearest balls up to the group's size; then two groups at a time redistribute theirs, each ball
-/// to the prototype that it prefers, until nothing moves. Σ distance² falls every time.
+/// Distributes a range of sorted balls evenly among prototypes. First, in the prototypes' order,
+/// each takes the nearest balls up to the group's size; then two groups at a time redistribute
+/// theirs, each ball to its preferred prototype, until nothing moves. Σ distance² falls every time.
 class EvenShares {
  public:
   EvenShares(std::span<const Ball> balls, std::span<std::uint32_t> range, const Prototypes& at,
@@ -178,7 +178,7 @@ class EvenShares {
     std::iota(order_.begin(), order_.end(), 0u);
   }
 
-  /// Groups of `unit` one after the other, each sorted.
+  /// Makes groups of `unit` one after the other, each sorted.
   void run() {
     fill_in_turn();
     for (std::size_t p = 0; p < groups_; ++p)
@@ -196,7 +196,7 @@ class EvenShares {
         }
       if (*std::max_element(changed.begin(), changed.end()) < sweep) break;
     }
-    // Which balls are where is settled; their order within a group is not until now.
+    // Membership is settled; the order within a group was arbitrary until now.
     std::vector<std::uint8_t> group_of(order_.size());
     for (std::size_t p = 0; p < groups_; ++p)
       for (const std::uint32_t i : group(p)) group_of[i] = static_cast<std::uint8_t>(p);
@@ -207,7 +207,7 @@ class EvenShares {
   }
 
  private:
-  /// A ball by its place in the range, and what it is sorted by.
+  /// A ball by its index in the range, and its sort key.
   struct Entry {
     double key;
     std::uint32_t ball;
@@ -233,12 +233,12 @@ class EvenShares {
     }
   }
 
-  /// Shares out the balls of groups p and q anew. False: they stay as they are.
+  /// Redistributes the balls of groups p and q. False: nothing changes.
   bool share(std::size_t p, std::size_t q) {
     if (-leads_[p][q] < leads_[q][p]) return false;
     const auto first = group(p), second = group(q);
     if (first.empty() || second.empty()) return false;
-    // Those nearer to p's prototype come first.
+    // Balls nearer to p's prototype come first.
     pool_.clear();
     for (const auto& part : {first, second})
       for (const std::uint32_t i : part)
@@ -249,7 +249,7 @@ class EvenShares {
     const Entry last = *std::max_element(begin, middle);
     const Entry foremost = *std::min_element(middle, end);
     if (last < foremost) return false;
-    // Entries before all of the second half stay, and so do those behind all of the first.
+    // Entries before all of the second half stay, as do those after all of the first.
     Entry* const unsure =
         std::partition(begin, middle, [&](const Entry& entry) { return entry < foremost; });
     Entry* const sure =
@@ -271,11 +271,11 @@ class EvenShares {
 };
 
 /// Orders balls so that consecutive groups of 16, of 16², … are compact, by hierarchical batch
-/// neural gas: sixteen prototypes a node move to the mean of all balls, weighted by volume
+/// neural gas. Sixteen prototypes a node move to the mean of all balls, weighted by volume
 /// (magnification control) and by a kernel over the prototype's rank as seen from the ball, while
-/// the kernel narrows; then the balls are shared out evenly among the prototypes, near to near.
-/// (Weller, Zachmann: Inner Sphere Trees; Cottrell, Hammer et al.: Batch and median neural gas.)
-/// Only the last group may lack balls. `last_stays`: the last ball lacks spheres and stays last.
+/// the kernel narrows; then the balls are distributed evenly to the nearest prototypes. (Weller,
+/// Zachmann: Inner Sphere Trees; Cottrell, Hammer et al.: Batch and median neural gas.) Only the
+/// last group may be incomplete. `last_stays`: the last ball has fewer spheres and stays last.
 class NeuralGas {
  public:
   NeuralGas(std::span<const Ball> balls, bool last_stays) : balls_(balls), last_stays_(last_stays) {
@@ -302,16 +302,17 @@ class NeuralGas {
   }
 
   Prototypes prototypes(std::span<const std::uint32_t> range, std::size_t count) const {
-    Prototypes at;  // start at balls spread over the range, which is in some order
+    Prototypes at;  // start at balls spread over the sorted range
     at.count = count;
     for (std::size_t p = 0; p < count; ++p) {
       const Ball& ball = balls_[range[(2 * p + 1) * range.size() / (2 * count)]];
       at.x[p] = ball.x, at.y[p] = ball.y, at.z[p] = ball.z;
     }
-    // In parts of fixed size, added in their order: the same bits for any number of threads.
+    // In parts of fixed size, added in order: the same bits for any number of threads.
     std::vector<GasPull> pulls((range.size() + kPart - 1) / kPart);
-    // Neighbourhood range λ from half the prototypes towards zero, where this is plain k-means. The
-    // kernel q^rank with q = λ / (1 + λ) stands for exp(−rank / λ): five operations make it.
+    // The neighbourhood range λ falls from half the prototypes towards zero, where this is plain
+    // k-means. The kernel q^rank with q = λ / (1 + λ) replaces exp(−rank / λ): it takes five
+    // operations.
     double lambda = static_cast<double>(count) / 2;
     for (int epoch = 0; epoch < kEpochs; ++epoch, lambda *= 0.75) {
       PrototypeValues kernel{};
@@ -334,7 +335,7 @@ class NeuralGas {
     return at;
   }
 
-  /// Sorts `range` into groups of `unit` and a last one of the rest; `pinned`: the last ball stays
+  /// Sorts `range` into groups of `unit` and an incomplete last one; `pinned`: the last ball stays
   /// last.
   void assign(std::span<std::uint32_t> range, const Prototypes& prototypes, std::size_t unit,
               bool pinned) const {
@@ -367,12 +368,12 @@ std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::
   return groups;
 }
 
-/// Orders the groups of 16 that follow one another in `order`: groups of their balls, and so on.
+/// Orders the consecutive groups of 16 of `order`: groups of their balls, and so on.
 std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
                                         std::vector<std::uint32_t> order, bool last_stays,
                                         bool swaps) {
   if (order.size() <= std::size_t{kWidth} * kWidth) return order;
-  // A group that is not full comes last, and so does any that contains one that is not.
+  // An incomplete group comes last, and so does any that contains one.
   const std::vector<std::uint32_t> groups =
       tree_order(group_balls(balls, order), swaps, last_stays || order.size() % kWidth != 0);
   std::vector<std::uint32_t> sorted;

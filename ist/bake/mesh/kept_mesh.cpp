@@ -35,7 +35,7 @@ struct Box {
   }
 };
 
-/// Patches in an order whose groups of 16, 256, … lie together.
+/// Patches in an order whose groups of 16, 256, … are compact.
 std::vector<BlockPatch> patches_in_order(const MeshView& mesh) {
   std::vector<BlockPatch> patches = cut_into_patches(in_floats(mesh));
   std::vector<std::array<float, 3>> middles(patches.size());
@@ -50,7 +50,7 @@ std::vector<BlockPatch> patches_in_order(const MeshView& mesh) {
   return sorted;
 }
 
-/// Vertices are numbered as blocks first use them.
+/// Numbers vertices in the order in which blocks use them.
 void lay_out_blocks(const MeshView& mesh, const std::vector<BlockPatch>& patches,
                     MeshArrays& arrays) {
   std::vector<std::uint32_t> number(mesh.vertex_count, kNoVertex);
@@ -82,9 +82,9 @@ void lay_out_blocks(const MeshView& mesh, const std::vector<BlockPatch>& patches
   arrays.header.vertex_count = used;
 }
 
-/// Calls visit(b, other, place) for blocks that share a vertex, `place` in block b: at a vertex of
-/// many blocks, each of which would name all others, only for those on both sides of an edge, and
-/// where these leave groups apart for one of each.
+/// Calls visit(b, other, place) for blocks that share a vertex, with its `place` in block b. At a
+/// vertex of so many blocks that each would list all others, only the blocks on both sides of an
+/// edge are visited, and one block of each group that this leaves separate.
 template <class Visit>
 void for_neighbours(const MeshArrays& arrays, const ItemGroups<>& around, const Visit& visit) {
   const auto place_of = [&](std::uint32_t b, std::uint32_t v) {
@@ -138,7 +138,7 @@ void find_neighbours(MeshArrays& arrays) {
                                 for (std::uint32_t i = 0; i < arrays.blocks[b].vertices; ++i)
                                   visit(arrays.blocks[b].vertex[i], b);
                             });
-  // For each block: the other block and the place of the vertex.
+  // For each block: the other block, and the index of the vertex.
   std::vector<std::vector<std::pair<std::uint32_t, std::uint32_t>>> found_of(arrays.blocks.size());
   for_neighbours(arrays, around, [&](std::uint32_t b, std::uint32_t other, std::uint32_t place) {
     found_of[b].emplace_back(other, place);
@@ -203,7 +203,7 @@ void lay_out_boxes(std::vector<Box> below, MeshArrays& arrays) {
   } while (below.size() > 1);
 }
 
-/// Adds the integrals over a triangle, corners from the point that they are taken about.
+/// Adds the integrals over a triangle; `p`: corners relative to the reference point.
 void add_integrals(const double (&p)[3][3], BoxSums& sums, std::size_t lane) {
   double middle[3], n[3];  // n: ∫ n dA
   area_normal(p[0], p[1], p[2], n);
@@ -243,7 +243,7 @@ void find_sums(MeshArrays& arrays) {
   }
 }
 
-/// Along the mean normal, or z where there is none.
+/// Slabs along the mean normal, or z if there is none.
 void find_slabs(MeshArrays& arrays) {
   std::size_t span = 1;  // blocks below a lane
   for (std::size_t level = 0; level < arrays.boxes.size(); ++level, span *= kWidth)
@@ -273,12 +273,12 @@ void find_slabs(MeshArrays& arrays) {
     }
 }
 
-/// Lays out a closed surface as asset_layout.h draws the mesh: blocks of neighbouring triangles in
-/// an order whose groups of 16, 256, … are compact, boxes around them, shells and neighbours.
-/// Blocks that share a vertex are neighbours, and their triangles belong to one shell.
+/// Lays out a closed surface in the form of asset_layout.h: blocks of neighbouring triangles in an
+/// order whose groups of 16, 256, … are compact, boxes around them, shells and neighbours. Blocks
+/// that share a vertex are neighbours, and their triangles belong to one shell.
 ///
-/// `mesh`: unit frame; vertices are taken bit for bit, but −0 becomes 0. `header.error` and
-/// `header.rounding` are the caller's to set. Deterministic on any machine.
+/// `mesh`: unit frame; vertices are copied bit for bit, except that −0 becomes 0. The caller sets
+/// `header.error` and `header.rounding`. Deterministic on any machine.
 MeshArrays lay_out_mesh(const MeshView& mesh) {
   MeshArrays arrays;
   lay_out_blocks(mesh, patches_in_order(mesh), arrays);
@@ -292,10 +292,10 @@ MeshArrays lay_out_mesh(const MeshView& mesh) {
   return arrays;
 }
 
-/// For a mesh that may be unresolved. Unit frame: ∫ |w − [w ≥ 1]| of the winding number w, as far
-/// as its sign is the same everywhere. 0: the mesh bounds its solid, except for faces that touch.
+/// For a mesh that may be unresolved. Unit frame: ∫ |w − [w ≥ 1]| of the winding number w, assuming
+/// that its sign is constant. 0: the mesh bounds its solid, except for touching faces.
 double estimate_counted_twice(const MeshSolid& solid) {
-  constexpr double kNothing = 1e-9;  // of the volume: what rounding makes of faces that touch
+  constexpr double kNothing = 1e-9;  // of the volume: rounding of touching faces
   if (!solid.may_overlap()) return 0;
   const double more = std::abs(enclosed_moments(solid.arrays()).volume - solid.unit_volume());
   return more > kNothing * solid.unit_volume() ? more : 0;

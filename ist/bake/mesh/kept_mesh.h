@@ -14,7 +14,7 @@
 
 namespace ist {
 
-/// Blocks around a vertex: where there are more, a block names only some of the others.
+/// Maximum of blocks around a vertex; if there are more, a block lists only some of the others.
 inline constexpr std::size_t kMostAround = 256;
 
 /// The boundary of a solid as an asset stores it.
@@ -27,7 +27,7 @@ struct KeptMesh {
 /// `resolution`: how the solid's mesh was made. Deterministic on any machine.
 KeptMesh keep_mesh(const MeshSolid& solid, const Resolution& resolution);
 
-/// A solid's mesh, laid out once and shared by all its assets; `wanted`: false: no mesh.
+/// A solid's mesh, laid out once and shared by all its assets. `wanted`: false: no mesh.
 struct SharedMesh : Aside<KeptMesh> {
   SharedMesh(const MeshSolid& solid, const Resolution& resolution, bool wanted, unsigned threads)
       : Aside(threads, [&solid, &resolution, wanted](const WorkStop&) {
@@ -46,7 +46,7 @@ struct FloatMesh {
 
 FloatMesh in_floats(const MeshView& mesh);
 
-/// Triangles that go into one block: at most kWidth, of at most kWidth vertices.
+/// Triangles of one block: at most kWidth, with at most kWidth vertices.
 struct BlockPatch {
   std::vector<std::uint32_t> triangles;
   std::vector<std::uint32_t> vertices;  ///< theirs, each once
@@ -57,14 +57,14 @@ struct BlockPatch {
   }
 };
 
-/// Cuts a mesh into patches that are full and compact: each grows from a triangle by neighbours
-/// that add few vertices and lie near its middle; what is left in small pieces goes together where
-/// it is near and shares a vertex. Every triangle is in one patch. Deterministic.
+/// Cuts a mesh into full and compact patches. Each grows from a triangle by neighbours that add few
+/// vertices and are near its middle; remaining small pieces are joined if they are near and share a
+/// vertex. Every triangle is in one patch. Deterministic.
 std::vector<BlockPatch> cut_into_patches(const FloatMesh& mesh);
 
 /// An order of points in which neighbours are near each other: their box is halved across its
-/// longest side, again and again, so that every group of 16, 256, … from the start is compact. Ties
-/// go by index. The same for any number of threads.
+/// longest side recursively, so that every group of 16, 256, … from the start is compact. Ties are
+/// broken by index. The same for any number of threads.
 std::vector<std::uint32_t> spatial_order(std::span<const std::array<float, 3>> points);
 
 }  // namespace ist

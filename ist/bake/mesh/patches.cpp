@@ -52,7 +52,7 @@ void halve(std::span<const FloatPoint> points, std::span<std::uint32_t> order) {
   }
 }
 
-/// Sorts each last group by index: what nth_element leaves is no library's promise.
+/// Sorts each last group by index: the output order of nth_element is unspecified.
 void settle(std::span<std::uint32_t> order) {
   for (std::size_t begin = 0; begin < order.size(); begin += kWidth)
     std::sort(order.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -61,7 +61,7 @@ void settle(std::span<std::uint32_t> order) {
 }
 
 constexpr std::uint32_t kNone = ~0u;
-/// Patches are joined where the result is not larger than this, in radii of the larger.
+/// Patches are joined if the result is not larger than this, in radii of the larger.
 constexpr double kJoinedRadius = 1.5;
 
 double dot(const FloatPoint& a, const FloatPoint& b) {
@@ -79,12 +79,12 @@ double distance2(const FloatPoint& a, const FloatPoint& b) {
   return sum;
 }
 
-/// 1 − cos of an angle, 45°. Patches do not grow over sides where the surface turns by more, so
-/// that those of a thread's flanks and of a part's faces are thin along their normal.
+/// Patches do not grow over sides where the surface turns by more than 45°, so that those of a
+/// thread's flanks and of a part's faces are thin along their normals. In 1 − cos of the angle.
 constexpr double kCrease = 0.3;
 
-/// A vertex of more triangles than this leads to no neighbour: each is found by its other corners,
-/// and looking at all of them for each patch would take the square of their number.
+/// Neighbours are not searched at a vertex of more triangles than this: other corners lead to them,
+/// and visiting all of them for each patch would take quadratic time.
 constexpr std::size_t kLargestStar = 1024;
 
 class Growth {
@@ -117,7 +117,7 @@ class Growth {
     std::vector<BlockPatch> patches;
     std::uint32_t seed = kNone;
     for (const std::uint32_t next : spatial_order(middle_)) {
-      // From beside the last patch as long as there is something.
+      // Starts next to the last patch as long as triangles are left there.
       while (seed != kNone || taken_[next] == 0) {
         patches.push_back(grown(seed != kNone ? seed : next));
         seed = beside(patches.back());
@@ -144,7 +144,7 @@ class Growth {
     }
   }
 
-  /// In the one that grows.
+  /// True if the vertex is in the growing patch.
   bool is_in_patch(std::uint32_t vertex) const { return last_patch_[vertex] == patches_; }
 
   /// True if there is a crease at all sides that a triangle shares with the patch or, where it
@@ -161,9 +161,9 @@ class Growth {
     return (least_turned < 2 ? least_turned : turned) > kCrease;
   }
 
-  /// Of the triangles that touch the patch and fit, the one that adds fewest vertices, with a bonus
-  /// for those that would be left alone; then the one nearest to the patch's middle, where a turned
-  /// normal counts as distance.
+  /// Among the triangles that touch the patch and fit, the one that adds fewest vertices, with a
+  /// bonus for those that would be isolated; then the one nearest to the patch's middle, where a
+  /// turned normal counts as distance.
   std::uint32_t best_neighbour(const BlockPatch& patch) const {
     if (patch.triangles.size() == kWidth) return kNone;
     FloatPoint middle = {}, normal = {};
@@ -194,7 +194,7 @@ class Growth {
     return std::get<2>(best);
   }
 
-  /// Of the triangles at the patch with the fewest others left around them the nearest to its
+  /// Among the triangles at the patch with the fewest remaining neighbours, the one nearest to its
   /// first.
   std::uint32_t beside(const BlockPatch& patch) const {
     using Score = std::tuple<std::uint32_t, double, std::uint32_t>;
@@ -214,9 +214,9 @@ class Growth {
 
   const FloatMesh& mesh_;
   const ItemGroups<> stars_;         ///< the triangles around each vertex
-  std::vector<std::uint32_t> left_;  ///< of them in no patch yet
+  std::vector<std::uint32_t> left_;  ///< those in no patch yet
   std::vector<std::uint8_t> taken_;
-  std::vector<std::uint32_t> last_patch_;  ///< [vertex] the last that took it, from 1
+  std::vector<std::uint32_t> last_patch_;  ///< [vertex] the last patch that contains it, from 1
   std::uint32_t patches_ = 0;
   std::vector<FloatPoint> middle_, normal_;  ///< of triangles
 };
@@ -249,7 +249,7 @@ std::vector<std::uint32_t> united(const BlockPatch& a, const BlockPatch& b) {
   return all;
 }
 
-/// Joins patches that are not full to others near them that share a vertex.
+/// Joins incomplete patches to others near them that share a vertex.
 std::vector<BlockPatch> joined(const FloatMesh& mesh, std::vector<BlockPatch> patches) {
   std::vector<FloatPoint> middles(patches.size());
   std::vector<double> radii(patches.size());
@@ -258,7 +258,7 @@ std::vector<BlockPatch> joined(const FloatMesh& mesh, std::vector<BlockPatch> pa
     middles[p] = extent.middle;
     radii[p] = extent.radius;
   }
-  constexpr std::size_t kWindow = 24;  // patches behind in the order that are tried
+  constexpr std::size_t kWindow = 24;  // following patches that are tried
   const std::vector<std::uint32_t> order = spatial_order(middles);
   for (std::size_t i = 0; i < order.size(); ++i) {
     BlockPatch& patch = patches[order[i]];

@@ -22,7 +22,7 @@ struct LinePart {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// A ball or a box somewhere, cut by lines exactly.
+/// A ball or a box, whose intersections with lines are exact.
 class ConvexBody {
  public:
   /// `radius` > 0, [u].
@@ -94,17 +94,17 @@ constexpr std::uint32_t kTriesPerTrial = 6;
 // Fractions of the solid's diagonal.
 constexpr double kSmallest = 0.1, kLargest = 0.3;  // diameters and edges
 constexpr double kPlateThickness = 0.02;
-constexpr double kPlaneReach = 4;  // half extent of the box that the plane's truth is
+constexpr double kPlaneReach = 4;  // half extent of the box whose exact volume represents the plane
 
-/// A partner turned as it will come, around the origin.
+/// A rotated partner, around the origin.
 struct TrialShape {
   Shape field;
   Pose pose;              ///< of the field
-  ConvexBody body;        ///< what the truth is of
-  Vector3d half_extents;  ///< [u] of a ball: its radius
+  ConvexBody body;        ///< whose exact volume is computed
+  Vector3d half_extents;  ///< [u] for a ball: its radius
 };
 
-/// Turns `from` to `to`, both of unit length, with a random turn about `to`.
+/// Rotates `from` to `to`, both of unit length, with a random rotation about `to`.
 Quaterniond random_turn(const Vector3d& from, const Vector3d& to, TrialRandom& random) {
   for (;;) {
     const Quaterniond spin = random.rotation();
@@ -164,12 +164,12 @@ TrialShape shape_of(TrialPartner partner, double diagonal, const Vector3d& direc
   }
 }
 
-/// How far from `target` along `direction` a body that comes from there first contains `wanted` of
-/// the points, in lengths of `direction`.
+/// The distance from `target` along `direction`, in lengths of `direction`, at which an approaching
+/// body first contains `wanted` of the points.
 std::optional<double> travel_of(const ConvexBody& body, const std::vector<Vector3d>& points,
                                 const Vector3d& target, const Vector3d& direction,
                                 std::size_t wanted) {
-  // during the approach: a point enters (1) or leaves (−1)
+  // Events of the approach: a point enters (1) or leaves (−1).
   std::vector<std::pair<double, int>> events;
   for (const Vector3d& x : points)
     if (const auto part = body.part_of(x - target, -direction)) {
@@ -207,7 +207,7 @@ std::vector<Vector3d> inner_points(const MeshSolid& solid, std::size_t count) {
   lattice.step_z = sizes.z() / lattice.nz;
   lattice.offset = kGoldenRatio / 2;
   lattice.shift = kGoldenRatio;
-  // Along the lines, so that each stands for as much as a cell of the wanted step.
+  // The spacing along the lines that gives each point the volume of a cell of the wanted step.
   const double along = step * step * step / (lattice.step_y * lattice.step_z);
   std::vector<Vector3d> points;
   double turned = 0;  // of the first point of a line, over the step

@@ -8,22 +8,22 @@
 
 namespace ist {
 
-/// About `count` points [u] spread evenly over the solid: a share of them inside a body is about
-/// the share of the solid's volume that lies in it. Same points on any machine and for any number
-/// of threads; runs on the caller's TBB threads.
+/// About `count` points [u] spread evenly over the solid: the share of them inside a body is about
+/// the share of the solid's volume in it. Same points on any machine and for any number of threads;
+/// runs on the caller's TBB threads.
 std::vector<Eigen::Vector3d> inner_points(const MeshSolid& solid, std::size_t count);
 
-/// [u³] What a ball has inside the solid, to rounding; the mesh must wind around every point once
-/// or not at all. Looks at every triangle.
+/// [u³] The ball's volume inside the solid, to rounding; the winding number of the mesh must be 0
+/// or 1 at every point. Visits every triangle.
 double ball_part(const MeshSolid& solid, const Eigen::Vector3d& centre, double radius);
 
-/// A solid, at rest, and a partner of another shape and size that meets it.
+/// A solid, at rest, and an overlapping partner of another shape and size.
 struct PartnerTrial {
   PlacedShape partner;  ///< in the solid's frame
   double volume = 0;    ///< [u³] of the overlap
 };
 
-/// The partners of the trials, besides a copy of the solid.
+/// The partners of the trials other than a copy of the solid.
 inline constexpr TrialPartner kOtherPartners[] = {TrialPartner::plane, TrialPartner::ball,
                                                   TrialPartner::edge, TrialPartner::corner,
                                                   TrialPartner::plate};
@@ -31,8 +31,8 @@ inline constexpr TrialPartner kOtherPartners[] = {TrialPartner::plane, TrialPart
 /// Finds trials of partners other than a copy.
 ///
 /// Balls and boxes measure 0.1 to 0.3 of the solid's diagonal, plates are 0.02 of it thick. Each
-/// comes from outside along a random direction, towards a random point of the solid, until it
-/// shares a volume within half a decade of the one wanted. Places are found by points of the solid
+/// approaches from outside along a random direction, towards a random point of the solid, until it
+/// shares a volume within half a decade of the wanted one. Places are found by points of the solid
 /// alone, so that they favour no packing; volumes are exact.
 ///
 /// Deterministic for a seed, on any machine. Runs on the caller's TBB threads.

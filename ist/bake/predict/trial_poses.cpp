@@ -35,7 +35,7 @@ class Trials {
         random_(seed),
         go_on_([this, go_on] { return !go_on || go_on(done_); }) {}
 
-  /// Tells that the `i`-th of `count` poses is next; false: it is not to go on.
+  /// Announces that the `i`-th of `count` poses is next; false: stop.
   bool next(std::size_t i, std::size_t count) {
     done_ = static_cast<double>(i) / static_cast<double>(count);
     return go_on_();
@@ -45,7 +45,7 @@ class Trials {
   bool approach(double fraction, TrialPose& out) {
     const Eigen::Quaterniond q = random_.rotation();
     const Vector3d direction = random_.direction();
-    // From outside in, since solids may have holes in the middle.
+    // The search goes from outside in, since solids may have holes in the middle.
     const double start = radius_a_ + radius_b_;
     double near = start, far = start;
     const auto shares = [&](double travel) {
@@ -78,7 +78,7 @@ class Trials {
     return false;
   }
 
-  /// A small B somewhere inside A.
+  /// Places a small B somewhere inside A.
   bool contain(double size, TrialPose& out) {
     constexpr double kAll = 1 - 1e-9;
     out.scale_b = size * radius_a_ / radius_b_;
@@ -98,7 +98,7 @@ class Trials {
   TrialRandom& random() { return random_; }
 
  private:
-  /// NaN where it is not known.
+  /// NaN if it is not known.
   double shared_volume(const Pose& b_in_a, double scale_b) {
     const Penetration found = penetration({a_.mesh, {}, 1}, {b_.mesh, b_in_a, scale_b},
                                           {.measure = Measure::exact}, workspace_);
@@ -142,7 +142,8 @@ std::vector<TrialPose> trial_poses(const TrialBody& a, const TrialBody& b, std::
     }
     for (std::uint32_t i = 0; i < kTriesPerPose * per_class && found < per_class; ++i) {
       if (!next()) return poses;
-      // From the class's floor up a decade, evenly on the logarithm; deep ones evenly up to 0.5.
+      // From the class's lower limit up a decade, evenly on the logarithm; deep overlaps evenly up
+      // to 0.5.
       const double fraction = k == 1 ? kOverlapClassFloor[k] + 0.4 * trials.random().uniform()
                                      : random_in_decade(kOverlapClassFloor[k], trials.random());
       TrialPose pose;

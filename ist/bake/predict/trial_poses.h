@@ -12,7 +12,7 @@ namespace ist {
 
 inline constexpr double kHalfDecade = 3.1622776601683795;
 
-/// Random numbers by + − × ÷ sqrt, so that poses are the same everywhere.
+/// Random numbers by + − × ÷ sqrt, so that poses are the same on every platform.
 class TrialRandom {
  public:
   explicit TrialRandom(std::uint64_t seed) : state_(seed) {}
@@ -29,7 +29,7 @@ class TrialRandom {
     }
   }
 
-  /// Evenly spread over all rotations: a point of the ball in four dimensions, brought to length 1.
+  /// Uniform over all rotations: a point of the four-dimensional ball, normalised.
   Eigen::Quaterniond rotation() {
     for (;;) {
       const double q[4] = {symmetric(), symmetric(), symmetric(), symmetric()};
@@ -53,7 +53,7 @@ inline double random_in_decade(double floor, TrialRandom& random) {
   return floor;
 }
 
-/// Two solids that overlap, with the truth about it.
+/// Two solids that overlap, with the exact volume.
 struct TrialPose {
   Pose b_in_a;  ///< x_A = R (scale_b · x_B) + t
   double scale_b = 1;
@@ -73,10 +73,10 @@ struct TrialBody {
 };
 
 /// About `per_class` poses for each class of overlap: independent random rotations, directions of
-/// approach and overlaps, spread evenly over their logarithm (over 10–50 % over themselves);
-/// `contained` ones contain a smaller B whole. Volumes are exact. Same poses for the same seed, on
-/// any machine. `go_on(part)`, if any, is told every few milliseconds which part of [0, 1] is done;
-/// once it says no, the poses so far are all.
+/// approach and overlaps, uniform in their logarithm (over 10–50 % uniform in themselves). In
+/// `contained` ones A contains a smaller B. Volumes are exact. Same poses for the same seed, on any
+/// machine. `go_on(part)`, if any, is called every few milliseconds with the finished part of [0,
+/// 1]; if it returns false, the poses so far are returned.
 std::vector<TrialPose> trial_poses(const TrialBody& a, const TrialBody& b, std::uint32_t per_class,
                                    std::uint64_t seed,
                                    const std::function<bool(double)>& go_on = {});
@@ -86,7 +86,7 @@ std::vector<TrialPose> trial_poses_near(double overlap, const TrialBody& a, cons
                                         std::uint32_t count, std::uint64_t seed,
                                         const std::function<bool(double)>& go_on = {});
 
-/// Whether a pose's overlap lies within half a decade of another.
+/// True if a pose's overlap is within half a decade of another.
 bool is_near(const TrialPose& pose, double overlap);
 
 }  // namespace ist

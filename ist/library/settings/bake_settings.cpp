@@ -11,9 +11,9 @@
 namespace ist {
 namespace {
 
-constexpr std::size_t kMostSpheres = 0x7fffffff;  // what the library takes
+constexpr std::size_t kMostSpheres = 0x7fffffff;  // the library's limit
 
-// These functions make a setting from the member that it sets: `of(settings)` is that member.
+// These functions make a setting from the member that it sets: `of(settings)` returns that member.
 
 template <class Of>
 using Member = std::remove_reference_t<std::invoke_result_t<Of, BakeSettings&>>;
@@ -58,7 +58,7 @@ Setting share(const char* name, Of of, const Range& range, const char* help) {
   return number(name, SettingKind::share, of, range, help);
 }
 
-/// `when`: what the member is where the flag is set.
+/// `when`: the member's value if the flag is set.
 template <class Of>
 Setting flag(const char* name, Of of, bool when, const char* help) {
   return {name,
@@ -153,12 +153,12 @@ Setting without_default(Setting setting, const char* shown = "") {
   return setting;
 }
 
-/// From settings to a member of `part`, itself a member of BakeSettings.
+/// Maps settings to a member of `part`, itself a member of BakeSettings.
 template <class Part, class T>
 auto member_of(Part BakeSettings::*part, T Part::*member) {
   return [part, member](BakeSettings& settings) -> T& { return (settings.*part).*member; };
 }
-/// The same, one step further.
+/// The same, one level deeper.
 template <class Part, class T>
 auto member_of(Part PackingSettings::*part, T Part::*member) {
   return [part, member](BakeSettings& settings) -> T& { return (settings.packing.*part).*member; };
@@ -238,15 +238,15 @@ const std::vector<Setting>& settings_list() {
   return list;
 }
 
-/// A setting of the grids that some modes have no use for.
+/// A setting of the grids that some modes do not use.
 struct ModeSetting {
   const char* name;
-  bool set;   ///< to another value than its automatic one
+  bool set;   ///< to a value other than its automatic one
   bool used;  ///< by the mode
   const char* users;
 };
 
-/// It would change nothing but the asset's hash.
+/// The fault of a setting that would change nothing but the asset's hash.
 std::optional<SettingFault> idle_setting(const PackingSettings& settings,
                                          const std::string& prefix) {
   const GridMode mode = settings.grid;
@@ -275,14 +275,13 @@ std::optional<SettingFault> idle_setting(const PackingSettings& settings,
   return std::nullopt;
 }
 
-/// A mesh alone is not packed.
 std::optional<SettingFault> mesh_only_fault(const BakeSettings& settings,
                                             const std::set<std::string>& own,
                                             const std::string& prefix) {
   if (!settings.packing.keep_mesh)
     return SettingFault{"mesh-only", "contradicts " + prefix + "keep-mesh no"};
   for (const Setting& setting : settings_list()) {
-    if (setting.name == "keep-mesh") break;  // what stands before it, is of packing
+    if (setting.name == "keep-mesh") break;  // all settings before this one concern packing
     if (own.count(setting.name) != 0)
       return SettingFault{setting.name, "has no effect with " + prefix + "mesh-only"};
   }
@@ -312,7 +311,7 @@ std::span<const Setting> closing_settings() {
 std::optional<SettingFault> complete(BakeSettings& settings, const std::set<std::string>& given,
                                      const std::set<std::string>& own, const std::string& prefix) {
   const bool aims = given.count("target-error") != 0;
-  // Unless asked for, the default count is no limit where an error is the target.
+  // Unless given, the default count is not a limit if an error is the target.
   if (aims && given.count("spheres") == 0) settings.packing.max_spheres = 0;
   if (!aims && own.count("at-overlap") != 0)
     return SettingFault{"at-overlap", "has no effect without " + prefix + "target-error"};

@@ -7,24 +7,24 @@
 #include <span>
 #include <utility>
 
-// All that may be asked of a bake, by name: the options of the command line and the keys of a
-// manifest are the same ones, read and checked here.
+// All settings of a bake by name: the options of the command line and the keys of a manifest are
+// the same, and are read and checked here.
 
 namespace ist {
 
 /// How the mesh of a file becomes the mesh that is baked.
 struct MeshSettings {
   bool repair = false;  ///< close an open mesh
-  double wrap = 0;      ///< detail of wrap_mesh() for one that is not closed so; 0: none is wrapped
-  Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< of the file's axes; scale_mesh() takes it
-  char up_axis = 0;     ///< 'X', 'Y' or 'Z': which of the file's axes is up; 0: nothing is turned
-  char world_up = 'Z';  ///< the mesh is turned so that this axis is up; where up_axis is given
+  double wrap = 0;      ///< detail of wrap_mesh() for a mesh that is still open; 0: no wrap
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< along the file's axes, for scale_mesh()
+  char up_axis = 0;     ///< 'X', 'Y' or 'Z': the file's up axis; 0: no rotation
+  char world_up = 'Z';  ///< the up axis after rotation, if up_axis is given
 };
 
 struct BakeSettings {
   MeshSettings mesh;
-  PackingSettings packing;  ///< device, GPU and threads are not among what is set by name
-  ErrorTarget target = {0, ErrorTarget().at_overlap};  ///< error 0: none is asked for
+  PackingSettings packing;  ///< device, GPU and threads are not set by name
+  ErrorTarget target = {0, ErrorTarget().at_overlap};  ///< error 0: none is requested
   bool mesh_only = false;                              ///< bake_mesh_only()
 };
 
@@ -41,11 +41,11 @@ enum class SettingKind {
 struct Setting {
   std::string name;      ///< "min-radius": --min-radius, or a key of a manifest
   std::string type;      ///< of its value, for help
-  std::string meaning;   ///< what it takes: "a whole number from 0 to 10"
-  std::string fallback;  ///< what it is if not given, for help; "": help says it
+  std::string meaning;   ///< its valid values: "a whole number from 0 to 10"
+  std::string fallback;  ///< the default, for help; "": stated in help
   std::string help;
   SettingKind kind;
-  /// False: the text is not what `meaning` says. A flag's is "true" or "false".
+  /// Returns false if the text does not match `meaning`. A flag's text is "true" or "false".
   std::function<bool(BakeSettings&, const std::string&)> take;
   std::function<std::string(BakeSettings)> show;  ///< its value, all digits
 };
@@ -61,16 +61,16 @@ struct SettingFault {
   std::string what;
 };
 
-/// To be called once all settings were taken. What was not given and follows from others is set;
-/// settings that contradict each other or have no effect are told.
+/// Call after all settings are read. Sets values that follow from others, and reports settings that
+/// contradict each other or have no effect.
 ///
-/// `given`: names of all that were given. `own`: those given for this bake alone, not as a default
-/// of many: to have no effect is then a mistake. Names in a fault's text begin with `prefix`: "--"
-/// or "".
+/// `given`: names of all given settings. `own`: those given for this bake alone, not as a default
+/// of many: if they have no effect, it is a mistake. Names in a fault's text begin with `prefix`:
+/// "--" or "".
 std::optional<SettingFault> complete(BakeSettings& settings, const std::set<std::string>& given,
                                      const std::set<std::string>& own, const std::string& prefix);
 
-/// Every setting that the bytes of an asset may depend on, as text; equal text, equal settings.
+/// Every setting that may affect the bytes of an asset, as text; equal text means equal settings.
 std::string describe_exactly(const BakeSettings& settings);
 
 inline constexpr std::pair<const char*, GridMode> kGridModes[] = {

@@ -6,7 +6,7 @@
 namespace ist {
 namespace {
 
-/// How many letters have to be changed, left out or put in, or neighbours swapped.
+/// The number of letters to change, remove or insert, or of neighbours to swap.
 std::size_t letters_apart(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1), above = row, second = row;
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;

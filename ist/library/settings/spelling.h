@@ -14,8 +14,8 @@ constexpr const char* word_of(Enum value, const char* const (&words)[kCount]) no
   return place < kCount ? words[place] : "unknown";
 }
 
-/// The word of `known` that was probably meant: no more letters apart than a third of its length,
-/// and at most two. Empty if there is none.
+/// The word of `known` that was probably meant: it differs by at most a third of its length, and at
+/// most two letters. Empty if there is none.
 std::string nearest_word(std::string_view word, std::span<const std::string> known);
 
 }  // namespace ist

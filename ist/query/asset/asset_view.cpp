@@ -90,7 +90,7 @@ bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected,
          mesh.neighbours == found.neighbours;
 }
 
-/// True for an asset with spheres, and for a mesh alone.
+/// True if the counts are those of an asset with spheres, or of a mesh alone.
 bool sound_counts(const AssetHeader& header) noexcept {
   if (header.sphere_count == 0) return header.mesh != 0 && header.detail_count == 0;
   return header.sphere_count <= kMaxSpheres && header.detail_count <= kMaxDetails &&

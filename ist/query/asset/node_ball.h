@@ -16,7 +16,6 @@ struct NodeBall {
   double r = 0;
 };
 
-/// The balls around a whole tree.
 struct RootBall {
   double centre[3];
   double r;      ///< contains its spheres

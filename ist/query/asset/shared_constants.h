@@ -45,9 +45,9 @@ inline constexpr double kPairRim = 1.6;
 // Fractions of the pair budget: a level that needs at most the first answers alone, one that needs
 // the second or more is not used.
 inline constexpr double kLevelAlone = 0.7, kLevelNone = 1;
-// The same for the finest level by a quick look. That estimates 0.4 to 7 times the pairs of the
-// oracle's contacts, and more than twice in half of them. Too low an estimate overdraws the budget
-// by at most a quarter.
+// The same fractions for the finest level if pairs are estimated by a coarse traversal, which gives
+// 0.4 to 7 times the pairs of the oracle's contacts, and more than twice in half of them. Too low
+// an estimate overdraws the budget by at most a quarter.
 inline constexpr double kLookAlone = 0.35, kLookNone = 0.5;
 
 /// Spheres below this fraction of the others' volume count as smaller.

@@ -38,7 +38,6 @@ IST_HD inline void move_away(double r, double (&at)[3]) {
   for (int k = 0; k < 3; ++k) at[k] += moved_along(k) * r;
 }
 
-/// A triangle and the axes of its plane.
 struct TrianglePlane : disc::PlaneFrame {
   double corner[3];  ///< the first
   bool flat;         ///< degenerate: skip it, as it has no plane
@@ -92,7 +91,6 @@ class Disc {
     return m2 + h_ * h_ < kOnEdge2 * (r_ * r_);
   }
 
-  /// Crossings of the disc with the edges.
   struct Crossings {
     unsigned through = 0;     ///< a bit for each edge that cuts the disc from side to side
     bool has_corner = false;  ///< the disc contains a corner

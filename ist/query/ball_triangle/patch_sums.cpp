@@ -298,7 +298,7 @@ HWY_INLINE void add_part(const SurfacePatch& patch, std::size_t t, std::size_t b
   }
 }
 
-/// Lanes beyond the last must be numbers.
+/// Fills the lanes after the last entry with finite numbers.
 HWY_INLINE void fill_up(DiscList& list) {
   for (std::size_t i = list.size; i < (list.size + 7) / 8 * 8; ++i) {
     list.h[i] = list.x[i] = list.y[i] = 0;
@@ -331,8 +331,8 @@ HWY_NOINLINE void take_corners(const SurfacePatch& patch, DiscList& corners, Pro
   add_parts(patch, 1, corners, sums);
 }
 
-/// Classifies a ball near a triangle: it misses it, its disc lies within, edges cut the disc from
-/// side to side, or the disc contains a corner.
+/// Classifies a ball near a triangle: the ball misses it, its disc lies within, edges cut the disc
+/// from side to side, or the disc contains a corner.
 HWY_INLINE void sort_disc(const SurfacePatch& patch, std::size_t t, std::size_t b, double height,
                           double x, double y, double r, DiscList& chords, DiscList& corners,
                           ProbeSums& sums) {

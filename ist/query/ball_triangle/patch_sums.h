@@ -71,14 +71,14 @@ struct ProbeSums {
 
 /// Adds the patch's integrals. Once all triangles that reach a ball are added, its part inside the
 /// closed surface has the volume [centre inside] · v + cones, the gradient −pull by the centre, and
-/// the first moment −shift about the centre. Exact but for rounding, some 1e-15 of r³. Same bits on
-/// every instruction set.
+/// the first moment −shift about the centre. Exact except for rounding, some 1e-15 of r³. Same bits
+/// on every instruction set.
 ///
-/// By rays from the centre: each triangle subtracts, or adds where its outer side is seen, the part
-/// of its cone between itself and the sphere, (r³ Ω − h A) / 3 over its part within the ball.
+/// Each triangle subtracts (or adds, if its outer side faces the centre) the part of its cone
+/// between itself and the sphere: (r³ Ω − h A) / 3 over its part within the ball.
 ///
-/// `triangles`, `chosen`: a bit for each triangle and ball to use; all triangles that come near one
-/// of these balls. A vector goes over the balls or the triangles, whichever are more.
+/// `triangles`, `chosen`: masks of the triangles and balls to use. `triangles` must contain all
+/// that come near one of these balls. Vectorised over balls or triangles, whichever are more.
 void add_patch(const SurfacePatch& patch, std::uint32_t triangles, const ProbeBalls& balls,
                std::uint32_t chosen, ProbeSums& sums) noexcept;
 

@@ -18,7 +18,7 @@ void answer_all(std::size_t count, std::size_t workers, const ParallelFor& paral
     std::atomic<std::size_t> next = 0;
   } all{count, answer};
   const auto work = [](void* context, std::size_t worker) {
-    constexpr std::size_t kTaken = 4;  // at a time, so that workers do not wait for the counter
+    constexpr std::size_t kTaken = 4;  // per fetch, to limit contention on the counter
     Batch& batch = *static_cast<Batch*>(context);
     for (;;) {
       const std::size_t begin = batch.next.fetch_add(kTaken, std::memory_order_relaxed);

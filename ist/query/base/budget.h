@@ -8,11 +8,10 @@
 
 namespace ist {
 
-/// The limits of a traversal.
 struct DescentLimits {
   static constexpr std::uint32_t kNoLimit = ~0u;
 
-  std::uint32_t max_visits = kNoLimit;  ///< 0: nothing but the roots is tested
+  std::uint32_t max_visits = kNoLimit;  ///< 0: only the roots are tested
   bool keep_rounding = false;           ///< grazing lenses are not summed again in double
 
   void spend(std::uint32_t visits) noexcept {

@@ -68,7 +68,6 @@ HookedArray<T> hooked_array(const MemoryHooks& hooks, std::size_t count) {
 template <class T>
 using Hooked = std::unique_ptr<T, HookedRelease>;
 
-/// One default-initialised value.
 template <class T>
 Hooked<T> hooked(const MemoryHooks& hooks) {
   T* const value = new (hooked_array<T>(hooks, 1).release()) T;

@@ -57,7 +57,7 @@ struct Similarity {
   IST_HD void apply_fused(const double (&x)[3], double (&y)[3]) const {
     for (int i = 0; i < 3; ++i) y[i] = fused(i, x, t[i]);
   }
-  /// Without the translation.
+  /// Applies the linear part only.
   IST_HD void turn_fused(const double (&x)[3], double (&y)[3]) const {
     for (int i = 0; i < 3; ++i) y[i] = fused(i, x, 0);
   }
@@ -183,7 +183,7 @@ struct PairPlace {
   }
 };
 
-/// The gradient by rotations of A about another origin. `arm`: [u] from that origin to this.
+/// The gradient by rotations of A about another origin. `arm`: [u] from that origin to the old one.
 IST_HD inline Vec3 turned_over(const Vec3& arm, const Vec3& push, const Vec3& turn) noexcept {
   return -(turn + cross(arm, push));
 }

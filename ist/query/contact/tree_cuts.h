@@ -78,7 +78,7 @@ class TreeCuts {
       moment += cube * members[count - 1].centre;
     }
 
-    // The cut is across the line through two far members …
+    // The cut is perpendicular to the line through two distant members,
     const auto farthest_from = [&](const Eigen::Vector3d& x) {
       std::uint32_t farthest = 0;
       double most = -1;
@@ -102,7 +102,8 @@ class TreeCuts {
       return l.along != r.along ? l.along < r.along : l.member < r.member;
     });
 
-    // … where the sum of squares about both sides' means is least: it varies by −|Σ w x|²/Σ w.
+    // at the position with the least sum of squares about both sides' means: −|Σ w x|²/Σ w and a
+    // constant.
     double best = -std::numeric_limits<double>::infinity();
     std::uint64_t best_side = 0, side = 0;
     double near = 0;

@@ -60,8 +60,8 @@ class ContactDivision {
  private:
   const ContactBin& bin(std::uint32_t i) const { return bins_[order_[i]]; }
 
-  /// The error of one force at one point in place of the part's: the spread of the points where it
-  /// pulls, and the pull that cancels. No part loses more than the part that contains it.
+  /// The error of replacing the part by one force at one point: the spread of its points of attack,
+  /// and the pull that cancels. It never exceeds the loss of a part that contains this one.
   double loss(const ContactPart& part) const {
     if (part.end - part.begin < 2) return 0;
     double pull = 0;
@@ -126,7 +126,8 @@ class ContactDivision {
   std::size_t size_ = 0;
 };
 
-/// Corrects the largest patch so that the patches' members sum to `whole`, but for the last digit.
+/// Corrects the largest patch so that the patches' members sum to `whole`, except for the last
+/// digit.
 template <class T>
 void complete(std::span<ContactPatch> patches, std::size_t largest, const T& whole,
               T ContactPatch::*member) {

@@ -7,7 +7,6 @@
 
 namespace ist {
 
-/// The filled bins of a contact.
 struct Binned {
   ContactBins& bins;
   std::uint32_t filled;
@@ -15,8 +14,9 @@ struct Binned {
   double radius;  ///< of the binned tree's root, A's unit frame
 };
 
-/// Makes `count` patches of a `part` of a blend sum to the blend, by volume. Without patches, as of
-/// a stopped query, one becomes the whole. Returns their number.
+/// Distributes the difference between a blend and its `part` over the part's `count` patches by
+/// volume. If there are none, as after a stopped query, one patch stands for the whole. Returns
+/// their number.
 std::size_t spread(const Penetration& part, const Penetration& whole, std::size_t count,
                    std::span<ContactPatch> patches) noexcept;
 

@@ -19,9 +19,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// The margin by which a vertex is above or below: the rounding of doubles; or so much that it
-/// stays there wherever points move within the tolerance, or B within the search's reach.
-enum class Margin { rounding, room, reach };
+/// How far from a plane a vertex must be to count as above or below: more than rounding, or so far
+/// that it stays there while points move within the tolerance, or B within the search's reach.
+enum class Margin { rounding, tolerance, reach };
 
 /// The triangles of a block whose corners are all among the given vertices, a bit each.
 HWY_INLINE std::uint32_t triangles_of(std::uint32_t vertices, const PlacedVertices& block) {
@@ -38,7 +38,6 @@ HWY_INLINE Vec3 all_lanes(const exact::Point& x) {
   return {hn::Set(d, x.x), hn::Set(d, x.y), hn::Set(d, x.z)};
 }
 
-/// The plane of a triangle.
 struct SeenPlane {
   Vec3 at, normal;
 
@@ -72,7 +71,7 @@ HWY_INLINE PlaneSides sides_of(const PlacedVertices& vertices, const PlacedPlane
   double beyond = 1.1 * exact::kFilter * planes.corner[t].number * apart;
   if (margin == Margin::reach)
     beyond += by * ((std::abs(n.x) + std::abs(n.y)) + std::abs(n.z));
-  else if (margin == Margin::room)  // six products of three numbers
+  else if (margin == Margin::tolerance)  // six products of three numbers
     beyond += 6 * by * longest * (2 * apart + longest);
   const SeenPlane plane(planes, t);
   const V top = hn::Set(d, (high - shift) + beyond), bottom = hn::Set(d, (low - shift) - beyond);
@@ -107,7 +106,6 @@ HWY_INLINE std::uint32_t beyond_edges_of(const PlacedPlanes& planes, std::uint32
   return out;
 }
 
-/// The planes of a block.
 inline const PlacedPlanes& placed_planes(const MeshTree& tree, std::uint32_t number,
                                          const Similarity* map, PlacedMesh& kept) {
   const auto [found, held] = kept.planes.find(number);
@@ -183,7 +181,7 @@ struct Straddling {
   std::uint32_t clear = 0, doubtful = 0;
 };
 
-/// The test is in float, with points that may move by `reach`.
+/// Tests in float, and allows for points that move by `reach`.
 HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
                                  const PlacedTriangles& b, std::uint32_t lanes, float reach) {
   const F d;
@@ -226,13 +224,13 @@ HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
   return out;
 }
 
-/// How often a search has asked what may not pay, and how often that was of use.
+/// Counts how often a search tried an optional test, and how often the test helped.
 struct Tally {
   std::uint32_t asked = 0, found = 0;
   bool pays() const { return asked <= 2 * found + 8; }
 };
-/// Of planes through edges of A's triangles and of B's, and of the pairs that they separated. Those
-/// pairs would cost three times as much otherwise.
+/// Statistics of planes through edges of A's and of B's triangles. A pair that they separate would
+/// otherwise cost three times as much.
 using EdgeTally = Tally[2];
 
 /// Two blocks whose triangles are tested in double by the planes of both sides, and by planes
@@ -251,7 +249,7 @@ class Meeting {
     for (int k = 0; k < 3; ++k)
       apart_ = std::max(apart_, std::max(of_a.all_high[k], of_b.all_high[k]) -
                                     std::min(of_a.all_low[k], of_b.all_low[k]));
-    apart_ += search.room;
+    apart_ += search.tolerance;
     // Four roundings each of a height, and of the offset that it is compared with.
     beyond_ = exact::kFilter * (double{of_a.reach} + double{of_b.reach}) +
               (margin == Margin::rounding ? 0.0 : (1 + 1e-6) * double{reach});
@@ -268,12 +266,12 @@ class Meeting {
     const double off = 1.1 * exact::kFilter * planes.corner[planes.widest].number * apart_;
     flat_[side] = true;
     return ~kept_apart(side, sides(side, planes.widest, planes.low - off, planes.high + off,
-                                   margin_ == Margin::room ? Margin::reach : margin_));
+                                   margin_ == Margin::tolerance ? Margin::reach : margin_));
   }
 
   /// The triangles of B among `lanes` that no plane separates from A's triangle i.
   std::uint32_t straddling(std::uint32_t i, std::uint32_t lanes) {
-    const bool told = margin_ != Margin::room;  // flat blocks' planes have decided
+    const bool told = margin_ != Margin::tolerance;  // flat blocks' planes have decided
     if (!told || !flat_[0]) lanes &= ~beside(0, i);
     if (!told || !flat_[1])
       lanes = columns_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
@@ -333,7 +331,7 @@ class Meeting {
   PlaneSides sides(int side, std::uint32_t t, double low, double high, Margin margin) const {
     return sides_of(*vertices_[1 - side], planes_of(side), t, low, high, aside_[side],
                     double{apart_}, margin,
-                    double{margin == Margin::reach ? reach_ : search_.room});
+                    double{margin == Margin::reach ? reach_ : search_.tolerance});
   }
   /// The other block's vertices that are farther from the plane of triangle t than `distance`.
   PlaneSides sides_by(int side, std::uint32_t t, double distance) const {
@@ -394,10 +392,10 @@ class Meeting {
   const std::uint32_t number_[2];
   const exact::Point aside_[2] = {search_.aside, -1 * search_.aside};  ///< of the other block
   const PlacedVertices* vertices_[2];
-  mutable const PlacedPlanes* planes_[2] = {};  ///< found when they are asked for first
-  float apart_ = 0;                             ///< no coordinates of both blocks differ by more
-  double beyond_;                               ///< what planes through edges keep apart by
-  bool flat_[2] = {};                           ///< whose edges are asked
+  mutable const PlacedPlanes* planes_[2] = {};  ///< computed at the first use
+  float apart_ = 0;    ///< bounds the differences of coordinates of both blocks
+  double beyond_;      ///< the separation that planes through edges must exceed
+  bool flat_[2] = {};  ///< the block is flat: its edges are tested
   Columns columns_, edges_, touch_, flush_;
 };
 

@@ -3,7 +3,6 @@
 // its numbers: V, lanes of numbers T or a single one, with set(), magnitude(), lesser(), greater()
 // and all().
 
-/// A box and its slab.
 template <class V>
 struct LaneBox {
   V low[3], high[3], normal[3], slab_low, slab_high;
@@ -24,7 +23,7 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
   using V = typename Of::V;
   const auto set = [](S x) { return Of::set(static_cast<T>(x)); };
   constexpr S kLength = S(1 - 1e-5);  // a lower bound of normals' lengths in float
-  constexpr S kLengthOfWay = sizeof(T) == sizeof(float) ? kLength : S(1 - 1e-14);
+  constexpr S kDirectionLength = sizeof(T) == sizeof(float) ? kLength : S(1 - 1e-14);
   const V zero = set(0), half_one = set(S(0.5));
   V away[3], half[3];
   V along = zero, across = zero, largest = set(S(-1e30));
@@ -45,28 +44,28 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
   // Distances perpendicular to the direction, by boxes.
   V beside = zero;
   for (int j = 0; j < 2; ++j) {
-    beside = beside + squared_gap(Of::magnitude(times(look.lane_way[1 + j], away)) -
-                                  (times(look.abs_way[1 + j], half) + set(one.beside_way[j])));
+    beside = beside + squared_gap(Of::magnitude(times(look.lane_direction[1 + j], away)) -
+                                  (times(look.abs_direction[1 + j], half) + set(one.across[j])));
   }
-  const V ahead = times(look.lane_way[0], away) + times(look.abs_way[0], half);
+  const V ahead = times(look.lane_direction[0], away) + times(look.abs_direction[0], half);
   const V box_ahead =
-      Of::greater(zero, set(kLengthOfWay * one.nearest) - set(kLengthOfWay) * ahead);
+      Of::greater(zero, set(kDirectionLength * one.nearest) - set(kDirectionLength) * ahead);
   const V by_boxes = Of::greater(along, box_ahead * box_ahead + beside);
   if (Of::all(by_boxes > beyond)) return false;
   for (int k = 0; k < 3; ++k) {
     across = across + squared_gap(Of::magnitude(times(look.lane_axis[k], away)) -
                                   (times(look.abs_axis[k], half) + set(one.reach[k])));
   }
-  // n is `turn` times the other normal plus a rest, along which only boxes are known.
+  // n is `turn` times the other normal plus a remainder, along which only boxes are known.
   const V(&n)[3] = box.normal;
   const V turn =
       (n[0] * set(one.normal[0]) + n[1] * set(one.normal[1])) + n[2] * set(one.normal[2]);
-  const V steep = times(look.lane_way[0], n);
+  const V steep = times(look.lane_direction[0], n);
   V at_middle = zero, at_box = zero, other_at_box = zero, to_box = zero, of_slab = zero;
   V rest[3];
   for (int i = 0; i < 3; ++i) {
-    const V rest_of_way = Of::set(look.lane_way[0][i]) - steep * n[i];
-    of_slab = of_slab + (rest_of_way * away[i] + Of::magnitude(rest_of_way) * half[i]);
+    const V across_slab = Of::set(look.lane_direction[0][i]) - steep * n[i];
+    of_slab = of_slab + (across_slab * away[i] + Of::magnitude(across_slab) * half[i]);
     rest[i] = n[i] - turn * set(one.normal[i]);
     const V other_rest = set(one.normal[i]) - turn * n[i];
     at_middle = at_middle + n[i] * set(one.middle[i]);
@@ -87,7 +86,7 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
   const V slab = Of::greater(zero, Of::greater(gap, other_gap) - set(3 * look.blur));
   of_slab = of_slab + Of::greater(steep * slab_low, steep * slab_high);
   const V ahead_gap =
-              squared_gap(set(kLengthOfWay) * (set(one.nearest) - Of::lesser(ahead, of_slab))),
+              squared_gap(set(kDirectionLength) * (set(one.nearest) - Of::lesser(ahead, of_slab))),
           slab_gap = set(kLength) * slab;
   apart = largest;
   squared =

@@ -39,30 +39,31 @@ IST_HD MiddleBox<S> box_of(const MeshTree& mesh, int level, std::uint32_t i) {
   return box;
 }
 
-/// The likely direction of the answer, and two axes perpendicular to it and each other.
-struct WayAxes {
-  exact::Point way[3];
+/// The likely direction of the gap, and two axes perpendicular to it and each other.
+struct GapAxes {
+  exact::Point axis[3];
 };
 
-IST_HD inline WayAxes axes_along(const exact::Point& way) {
-  const double x = std::abs(way.x), y = std::abs(way.y), z = std::abs(way.z);
+IST_HD inline GapAxes axes_along(const exact::Point& direction) {
+  const double x = std::abs(direction.x), y = std::abs(direction.y), z = std::abs(direction.z);
   const exact::Point least = x <= y && x <= z ? exact::Point{1, 0, 0}
                              : y <= z         ? exact::Point{0, 1, 0}
                                               : exact::Point{0, 0, 1};
-  exact::Point beside = cross(way, least);
+  exact::Point beside = cross(direction, least);
   if (const double length = std::sqrt(dot(beside, beside)); length > 0)
     beside = (1 / length) * beside;
-  return {{way, beside, cross(way, beside)}};
+  return {{direction, beside, cross(direction, beside)}};
 }
 
 /// The same axes in B's frame, with the direction from B to A.
-IST_HD inline WayAxes seen_back(const WayAxes& axes, const Similarity& b_from_a, double scale) {
+IST_HD inline GapAxes seen_back(const GapAxes& axes, const Similarity& b_from_a, double scale) {
   const double(&m)[9] = b_from_a.m;
-  WayAxes out;
+  GapAxes out;
   for (int j = 0; j < 3; ++j) {
-    const exact::Point& way = axes.way[j];
+    const exact::Point& direction = axes.axis[j];
     for (int i = 0; i < 3; ++i)
-      out.way[j][i] = -scale * ((m[3 * i] * way.x + m[3 * i + 1] * way.y) + m[3 * i + 2] * way.z);
+      out.axis[j][i] = -scale * ((m[3 * i] * direction.x + m[3 * i + 1] * direction.y) +
+                                 m[3 * i + 2] * direction.z);
   }
   return out;
 }
@@ -72,9 +73,9 @@ IST_HD inline WayAxes seen_back(const WayAxes& axes, const Similarity& b_from_a,
 template <class S>
 struct SeenBox {
   S middle[3], hull[3], reach[3], normal[3];
-  S low, high;      ///< its slab
-  S nearest;        ///< its extent backwards along the direction
-  S beside_way[2];  ///< and beside that
+  S low, high;  ///< its slab
+  S nearest;    ///< its extent backwards along the direction
+  S across[2];  ///< and across it
 };
 
 /// Compares boxes of one mesh with a box of the other: along their own axes, along the other's,
@@ -84,10 +85,10 @@ template <class T, class S>
 struct BoxLook {
   S m[9], shift[3], scale;  ///< from the other's frame to theirs
   S axis[3][3];             ///< the other's, in their frame
-  S along[3][3] = {};       ///< [way][axis of the other]: their product
+  S along[3][3] = {};       ///< [direction][axis of the other]: their product
   S blur;                   ///< the error of a coordinate
   // For lanes. The first direction leads from the boxes to the other, two are perpendicular to it.
-  T lane_axis[3][3], abs_axis[3][3], lane_way[3][3] = {}, abs_way[3][3] = {};
+  T lane_axis[3][3], abs_axis[3][3], lane_direction[3][3] = {}, abs_direction[3][3] = {};
 
   BoxLook() = default;
   /// `map` leads from the other's frame to theirs.
@@ -107,16 +108,17 @@ struct BoxLook {
 
   /// Sets the axes. The first, of length 1, leads from the boxes to the other mesh; or all are
   /// zero.
-  IST_HD void turn(const WayAxes& axes) {
+  IST_HD void turn(const GapAxes& axes) {
     for (int j = 0; j < 3; ++j)
-      for (int k = 0; k < 3; ++k) turn(axes.way[j], axes.way[j][k], j, k);
+      for (int k = 0; k < 3; ++k) turn(axes.axis[j], axes.axis[j][k], j, k);
   }
   /// Sets component k of the j-th axis.
-  IST_HD void turn(const exact::Point& way, double component, int j, int k) {
-    along[j][k] = static_cast<S>((way.x * double{axis[k][0]} + way.y * double{axis[k][1]}) +
-                                 way.z * double{axis[k][2]});
-    lane_way[j][k] = static_cast<T>(component);
-    abs_way[j][k] = std::abs(lane_way[j][k]);
+  IST_HD void turn(const exact::Point& direction, double component, int j, int k) {
+    along[j][k] =
+        static_cast<S>((direction.x * double{axis[k][0]} + direction.y * double{axis[k][1]}) +
+                       direction.z * double{axis[k][2]});
+    lane_direction[j][k] = static_cast<T>(component);
+    abs_direction[j][k] = std::abs(lane_direction[j][k]);
   }
 
   IST_HD SeenBox<S> see(const MiddleBox<S>& one) const {
@@ -135,15 +137,15 @@ struct BoxLook {
     const S before = (one.normal[0] * one.middle[0] + one.normal[1] * one.middle[1]) +
                      one.normal[2] * one.middle[2];
     out.low = scale * (one.slab_low - before), out.high = scale * (one.slab_high - before);
-    const S(&along_way)[3] = along[0];
-    const S turned = (along_way[0] * one.normal[0] + along_way[1] * one.normal[1]) +
-                     along_way[2] * one.normal[2];
+    const S(&along_direction)[3] = along[0];
+    const S turned = (along_direction[0] * one.normal[0] + along_direction[1] * one.normal[1]) +
+                     along_direction[2] * one.normal[2];
     S by_box = 0, by_slab = std::fmin(turned * out.low, turned * out.high);
-    out.beside_way[0] = out.beside_way[1] = 0;
+    out.across[0] = out.across[1] = 0;
     for (int k = 0; k < 3; ++k) {
-      by_box -= out.reach[k] * std::abs(along_way[k]);
-      by_slab -= out.reach[k] * std::abs(along_way[k] - turned * one.normal[k]);
-      for (int j = 0; j < 2; ++j) out.beside_way[j] += out.reach[k] * std::abs(along[1 + j][k]);
+      by_box -= out.reach[k] * std::abs(along_direction[k]);
+      by_slab -= out.reach[k] * std::abs(along_direction[k] - turned * one.normal[k]);
+      for (int j = 0; j < 2; ++j) out.across[j] += out.reach[k] * std::abs(along[1 + j][k]);
     }
     out.nearest = std::fmax(by_box, by_slab) - 3 * blur;
     return out;

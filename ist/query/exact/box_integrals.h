@@ -97,11 +97,12 @@ struct MoveAside {
 };
 
 /// The translation is far larger than the rounding of the meshes' placement, and far smaller than
-/// what the interval allows for anyway. So flush faces and copies in place have clear signs. It
-/// leads away from A's middle, since flush parts separate in that direction, and somewhat across,
-/// since no direction of a part is like that. It is opposite if A and B change places: so are its
-/// first and last term, and the sign of the other follows from the middles or, if these are equal,
-/// from the meshes' hashes. Copies of one mesh about one middle get the same translation.
+/// what the interval allows for anyway. So flush faces and coincident copies have clear signs. It
+/// points away from A's middle, since flush parts separate in that direction, and somewhat across,
+/// in a direction that no face or edge of a part is likely to have. It changes sign if A and B
+/// change places, as do its first and last term; the sign of the middle term follows from the
+/// middles or, if these are equal, from the meshes' hashes. Copies of one mesh about one middle get
+/// the same translation.
 IST_HD inline MoveAside aside_of(const MeshTree& a, const MeshTree& b,
                                  const Similarity& a_from_b) noexcept {
   using exact::Point;

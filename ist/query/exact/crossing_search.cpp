@@ -22,8 +22,8 @@ namespace ist::HWY_NAMESPACE {
 /// without a branch on which edge of which triangle pierces.
 class PiercingEdges {
  public:
-  /// Adds the crossing of pair n. `pierced`: its piercing edges [A's, B's], two if signs agree with
-  /// each other.
+  /// Adds the crossing of pair n. `pierced`: its piercing edges [A's, B's], exactly two if signs
+  /// are consistent.
   HWY_INLINE void add(const TrianglePairs& pairs, const PairHeights& heights,
                       const std::uint32_t (&pierced)[2][3], std::uint32_t n) {
     // The piercing edges, and those at the crossing's end. An edge that goes down enters the other
@@ -51,7 +51,7 @@ class PiercingEdges {
   }
   bool full() const { return count_ == 8; }
 
-  /// Writes what waits, as the last of `end` crossings.
+  /// Writes the pending edges as the last of `end` crossings.
   void write(std::uint32_t end, Crossings& out) {
     const std::uint32_t at = end - count_;
     for (std::uint32_t i = 0; i < count_; ++i)
@@ -102,7 +102,7 @@ class PiercingEdges {
         hn::IfThenElse(end.from_second, load(kEdge), load(kEdge) + hn::Set(d, 8.0)));
   }
 
-  alignas(64) double of_[2][kNumbers][8] = {};  // finite where none waits, computed too
+  alignas(64) double of_[2][kNumbers][8] = {};  // unused lanes are computed too, and must be finite
   std::uint32_t triangle_[2][8];
   std::uint32_t count_ = 0;
 };
@@ -119,7 +119,7 @@ class TriangleSearch : PairSigns {
         pad_b_(pad(search.a_from_b, b_)) {
     look_ahead(search.reach);
     scratch_.pairs->count = 0;
-    scratch_.pairs->asks = 0;
+    scratch_.pairs->unmarked = 0;
   }
 
   CrossingsFound run(std::uint32_t first, std::uint32_t next, std::uint32_t count,
@@ -128,7 +128,7 @@ class TriangleSearch : PairSigns {
     found_.crossings = first;
     std::uint32_t n = next;
     for (; n < count && found_.complete; ++n) {
-      // Two blocks add at most 256, and seven more wait.
+      // Two blocks add at most 256, and seven more may be pending.
       if (keep_ == nullptr && n > next && found_.crossings + 264 > scratch_.most_crossings) break;
       // If many more are near than cross, keeping them does not pay. Two blocks add at most 256.
       if (keep_ != nullptr && (gathered_ > 2 * n + 3 * keep->crossings + 512 ||
@@ -170,7 +170,7 @@ class TriangleSearch : PairSigns {
   CrossingsFound finish() {
     if (found_.complete) test_pairs();
     ends_.write(found_.crossings, scratch_.crossings);
-    // Sums take eight at a time.
+    // Sums process eight at a time.
     scratch_.crossings.clear(found_.crossings, (found_.crossings + 7) / 8 * 8);
     return found_;
   }
@@ -203,7 +203,7 @@ class TriangleSearch : PairSigns {
       if (made) return *made;
       const Margin margin = keep_ != nullptr               ? Margin::reach
                             : are_near(number_a, number_b) ? Margin::rounding
-                                                           : Margin::room;
+                                                           : Margin::tolerance;
       return made.emplace(search_, scratch_, number_a, number_b, margin, reach_);
     };
     const auto thin = [&](const float* low, const float* high, std::uint32_t lane) {
@@ -228,7 +228,7 @@ class TriangleSearch : PairSigns {
       const OneBox box(a.low, a.high, i, reach_);
       std::uint32_t lanes = in_a & meeting(b.low, b.high, box.low, box.high);
       if (lanes == 0) continue;
-      // Where floats decide nothing, they are not used again.
+      // Floats that decided nothing are not used again.
       const Straddling found = flush ? Straddling{0, lanes} : straddling(a, i, b, lanes, reach_);
       flush |= found.clear == 0 && found.doubtful != 0;
       if ((found.clear | found.doubtful) == 0) continue;
@@ -239,9 +239,9 @@ class TriangleSearch : PairSigns {
       if (lanes == 0) continue;
       for (const std::uint32_t k : set_bits(lanes))
         add_pair(kWidth * number_a + i, both.vertices(0), kWidth * number_b + k, both.vertices(1),
-                 both.margin() == Margin::room);
+                 both.margin() == Margin::tolerance);
       // Once both blocks are marked, planes decide far more.
-      if (!flush || both.margin() != Margin::room) continue;
+      if (!flush || both.margin() != Margin::tolerance) continue;
       const bool tries = !tried && marking_.pays();
       if (tries) test_pairs();
       tried |= tries;
@@ -258,11 +258,11 @@ class TriangleSearch : PairSigns {
     return has(scratch_.a.near, block_a) && has(scratch_.b.near, block_b);
   }
 
-  /// `asks`: its blocks are not both marked as near.
+  /// `unmarked`: its blocks are not both marked as near.
   void add_pair(std::uint32_t triangle_a, const PlacedVertices& vertices_a,
-                std::uint32_t triangle_b, const PlacedVertices& vertices_b, bool asks) {
+                std::uint32_t triangle_b, const PlacedVertices& vertices_b, bool unmarked) {
     TrianglePairs& pairs = *scratch_.pairs;
-    pairs.asks |= static_cast<std::uint32_t>(asks) << pairs.count;
+    pairs.unmarked |= static_cast<std::uint32_t>(unmarked) << pairs.count;
     put_triangle(a_, triangle_a, vertices_a, 0, pairs);
     put_triangle(b_, triangle_b, vertices_b, 1, pairs);
     if (++pairs.count == 8) keep_ == nullptr ? test_pairs() : keep_pairs();
@@ -272,34 +272,34 @@ class TriangleSearch : PairSigns {
   HWY_NOINLINE void test_pairs() {
     TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t count = std::exchange(pairs.count, 0);
-    const std::uint32_t asks = not_marked(pairs, std::exchange(pairs.asks, 0));
+    const std::uint32_t unmarked = not_marked(pairs, std::exchange(pairs.unmarked, 0));
     const std::uint32_t all = (1u << count) - 1;
     if (count == 0 || !found_.complete) return;  // two blocks go on to their end
     PairHeights heights;
-    WaysRound round;
-    asks != 0 ? find_heights<true>(pairs, count, heights)
-              : find_heights<false>(pairs, count, heights);
+    EdgeOrientations round;
+    unmarked != 0 ? find_heights<true>(pairs, count, heights)
+                  : find_heights<false>(pairs, count, heights);
     const std::uint32_t certain = each(heights.certain[0]) & each(heights.certain[1]);
     for (const std::uint32_t i : set_bits(all & ~heights.apart(heights.certain) & ~certain))
       find_heights_exactly(pairs, i, heights);
     const std::uint32_t meet = all & ~heights.apart(heights.certain);
     if (meet != 0) {
       const auto lanes = static_cast<std::uint32_t>(std::bit_width(meet));
-      asks != 0 ? find_ways_round<true>(pairs, lanes, round)
-                : find_ways_round<false>(pairs, lanes, round);
+      unmarked != 0 ? find_orientations<true>(pairs, lanes, round)
+                    : find_orientations<false>(pairs, lanes, round);
       test_edges(pairs, heights, meet, round);
     }
-    if (asks != 0) note_near(pairs, not_marked(pairs, asks & ~settled(heights, round)));
+    if (unmarked != 0) note_near(pairs, not_marked(pairs, unmarked & ~settled(heights, round)));
   }
 
   /// Tests by edges the pairs that planes left.
   HWY_INLINE void test_edges(const TrianglePairs& pairs, const PairHeights& heights,
-                             std::uint32_t all, WaysRound& round) {
+                             std::uint32_t all, EdgeOrientations& round) {
     std::uint32_t parts[2][3], pierced[2][3];
     heights.find_parts(parts);
     std::uint32_t left = round.undecided(all, parts, round.certain);
     if (left != 0) {
-      find_ways_closer(pairs, parts, left, round);
+      refine_orientations(pairs, parts, left, round);
       left = round.undecided(left, parts, round.certain);
     }
     for (const std::uint32_t i : set_bits(left)) find_round_exactly(pairs, parts, i, round);
@@ -331,7 +331,7 @@ class TriangleSearch : PairSigns {
   /// have marked theirs.
   HWY_INLINE void note_near(const TrianglePairs& pairs, std::uint32_t fresh) {
     if (fresh == 0) return;
-    // The first often marks the blocks of all.
+    // The first pair often marks the blocks of all others.
     mark_if_near(pairs, static_cast<std::uint32_t>(std::countr_zero(fresh)));
     fresh = not_marked(pairs, fresh & (fresh - 1));
     if (fresh == 0) return;
@@ -353,7 +353,7 @@ class TriangleSearch : PairSigns {
   void keep_pairs() {
     TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t count = std::exchange(pairs.count, 0);
-    pairs.asks = 0;
+    pairs.unmarked = 0;
     gathered_ += count;
     for (const std::uint32_t n :
          set_bits(((1u << count) - 1) & ~apart_by_axes(pairs, count, double{reach_}))) {
@@ -387,11 +387,11 @@ class TriangleSearch : PairSigns {
   Tally marking_;  ///< of tests at once, and of blocks that they marked
   PiercingEdges ends_;
   KeptPairs* keep_ = nullptr;   ///< near pairs are kept, and not tested yet
-  std::uint32_t gathered_ = 0;  ///< for it
+  std::uint32_t gathered_ = 0;  ///< pairs gathered for `keep_`
   CrossingsFound found_;
 };
 
-/// Asks pairs that cross whether they do so wherever points move.
+/// Tests whether crossing pairs cross however points move within the tolerance.
 class SettledSearch : PairSigns {
  public:
   SettledSearch(const CrossingSearch& search, ExactScratch& scratch)

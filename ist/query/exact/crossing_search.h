@@ -15,24 +15,24 @@ struct CrossingSearch {
   Similarity a_from_b;  ///< unit frames
   Similarity b_from_a;
   exact::Point aside = {0, 0, 0};  ///< A's unit frame: signs are those of B moved by this
-  float room = 0;                  ///< A's unit frame: points may be off by this
-  float near = 0;                  ///< pairs that come as near are found, ≥ room
-  float reach = 0;                 ///< and those that may, for what is kept: ≥ near
-  std::uint32_t max_visits = 0;    ///< pairs of nodes; 0: no limit
-  double touch = 0;  ///< solids that are as near touch: the rounding of poses and vertices
+  float tolerance = 0;             ///< A's unit frame: points may be off by this
+  float near = 0;                  ///< pairs within this distance are found, ≥ tolerance
+  float reach = 0;  ///< pairs within this distance are kept for later queries, ≥ near
+  std::uint32_t max_visits = 0;  ///< pairs of nodes; 0: no limit
+  double touch = 0;  ///< solids within this distance touch: the rounding of poses and vertices
 };
 
 /// Pairs of blocks of both meshes whose boxes come within `reach`.
 struct BlockPairs {
   std::uint32_t count = 0;   ///< in ExactScratch::keys, in any order: A's block << 32 | B's block
   std::uint32_t visits = 0;  ///< pairs of nodes opened
-  bool complete = true;      ///< no limit or room was short
+  bool complete = true;      ///< no limit was reached, and memory sufficed
 };
 
 struct CrossingsFound {
   std::uint32_t crossings = 0;  ///< in ExactScratch::crossings
-  std::uint32_t next = 0;       ///< the pair of blocks to go on from: `count` at the end
-  bool complete = true;         ///< no limit or room was short
+  std::uint32_t next = 0;       ///< the pair of blocks to continue from: `count` at the end
+  bool complete = true;         ///< no limit was reached, and memory sufficed
   bool consistent = true;       ///< signs agree with each other
 };
 
@@ -44,7 +44,6 @@ struct SurfaceContact {
   exact::Point moment = {};  ///< ∫ x dA over them
 };
 
-/// Finds the pairs of blocks.
 BlockPairs find_block_pairs(const CrossingSearch& search, ExactScratch& scratch) noexcept;
 
 /// Finds all crossing triangles of `count` pairs of blocks (ExactScratch::keys), in the order of

@@ -15,13 +15,14 @@ struct NearestPoints {
 };
 
 IST_FORMULA void take_nearer(NearestPoints& least, Real other, Mask valid, const Vec3& a,
-                             const Vec3& way) {
+                             const Vec3& vector) {
   const Mask nearer = both(valid, less(other, least.squared));
   least.squared = choose(nearer, other, least.squared);
   least.on_a = {choose(nearer, a.x, least.on_a.x), choose(nearer, a.y, least.on_a.y),
                 choose(nearer, a.z, least.on_a.z)};
-  least.between = {choose(nearer, way.x, least.between.x), choose(nearer, way.y, least.between.y),
-                   choose(nearer, way.z, least.between.z)};
+  least.between = {choose(nearer, vector.x, least.between.x),
+                   choose(nearer, vector.y, least.between.y),
+                   choose(nearer, vector.z, least.between.z)};
 }
 
 IST_FORMULA Real part_of_edge(Real x) { return lesser(greater(x, constant(0.0)), constant(1.0)); }
@@ -35,9 +36,9 @@ IST_FORMULA void along_edges(const Vec3& p, const Vec3& u, Real inverse_u, const
   const Vec3 n = cross(u, v);
   Real s = part_of_edge(dot(cross(w, v), n) * inverse_of(dot(n, n)));
   const Real t = part_of_edge(dot(s * u - w, v) * inverse_v);
-  const Vec3 way = w + t * v;
-  s = part_of_edge(dot(way, u) * inverse_u);
+  const Vec3 vector = w + t * v;
+  s = part_of_edge(dot(vector, u) * inverse_u);
   const Vec3 su = s * u;
-  const Vec3 between = way - su;
+  const Vec3 between = vector - su;
   take_nearer(least, dot(between, between), at_most(s, s), p + su, between);
 }

@@ -209,20 +209,20 @@ void ExactQuery::bound_near(const Side& own) noexcept {
 
 /// Finds the pairs of blocks, or takes the kept ones, for find_more().
 bool ExactQuery::begin_search(std::uint32_t max_visits, std::uint32_t pair_id) noexcept {
-  const double room = 2 * (sides_[0].moved + sides_[1].moved);
+  const double tolerance = 2 * (sides_[0].moved + sides_[1].moved);
   const MeshTree &a = sides_[0].mesh, &b = sides_[1].mesh;
-  search_.room = static_cast<float>(room * (1 + 1e-6));
-  search_.near = static_cast<float>((room + nearness()) * (1 + 1e-6));
+  search_.tolerance = static_cast<float>(tolerance * (1 + 1e-6));
+  search_.near = static_cast<float>((tolerance + nearness()) * (1 + 1e-6));
   search_.reach = search_.near;
   search_.max_visits = max_visits;
   scratch_.forget(a.hash);
   if (pair_id != 0 && max_visits == 0) {
     kept_ = &scratch_.kept.of(pair_id, a, b, a_from_b_);
-    if (scratch_.kept.serves(*kept_, b, room)) {
+    if (scratch_.kept.serves(*kept_, b, tolerance)) {
       serves_ = true;
       return true;
     }
-    scratch_.kept.begin(*kept_, a, b, room);
+    scratch_.kept.begin(*kept_, a, b, tolerance);
     search_.reach += static_cast<float>(kept_->margin * (1 + 1e-6));
   }
   const BlockPairs pairs = find_block_pairs(search_, scratch_);
@@ -239,7 +239,7 @@ CrossingsFound ExactQuery::find_more(std::uint32_t first, std::uint32_t next) no
   if (serves_) {
     found = find_kept_crossings(search_, *kept_, scratch_);
     if (found.complete) return found;
-    serves_ = false;  // there is no room for all at once
+    serves_ = false;  // they do not all fit into memory
     kept_->margin = 0;
     if (!begin_search(0, 0)) return found;
   }
@@ -257,7 +257,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
       out_.complete = false;
       return out_;
     }
-  // All of small meshes at once instead of line after line, first what is read first.
+  // Prefetches all of small meshes at once, in reading order, instead of line after line.
   for (const Side& side : sides_)
     if (side.mesh.top == 1) prefetch(side.mesh.level[1].boxes, side.mesh.level[1].boxes + 1);
   for (const Side& side : sides_)
@@ -299,7 +299,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
   if (!out_.complete) return out_;
   for (Side& side : sides_) find_insides(side);
   for (Side& side : sides_) {
-    // The order is that of the mesh, whichever was found first.
+    // Mesh order, which does not depend on the order of discovery.
     for_each_block(side.marks.pierced, side.mesh.level[0].count, [&](std::uint32_t b) {
       sum_crossed_block(side, side.marks.blocks[side.marks.place[b]]);
     });

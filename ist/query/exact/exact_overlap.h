@@ -46,7 +46,8 @@ class ExactQuery {
   /// `max_visits`: 0 for no limit. `pair_id`: the caller's pair, whose calls are steps of one
   /// motion; 0 for none.
   ExactOverlap run(std::uint32_t max_visits = 0, std::uint32_t pair_id = 0) noexcept;
-  /// True if ExactScratch holds all crossings that were found, as parts of the overlap need.
+  /// True if ExactScratch contains all crossings that were found, which parts of the overlap
+  /// require.
   bool holds_crossings() const noexcept { return whole_; }
 
  protected:
@@ -61,7 +62,6 @@ class ExactQuery {
   CrossedBlock& crossed_block(Side& side, std::uint32_t triangle) noexcept {
     return side.marks.blocks[side.marks.place[triangle / kWidth]];
   }
-  /// The edge of a triangle that is opposite to its apex.
   static std::uint32_t opposite_edge(const CrossedBlock& crossed, std::uint32_t triangle) noexcept {
     return 9u >> 2 * crossed.apex[triangle] & 3;  // the next one, without a branch
   }
@@ -143,7 +143,7 @@ class ExactQuery {
   bool serves_ = false, whole_ = true;
   std::uint32_t block_pairs_ = 0;
   SlotSums slots_;
-  double rounding_ = 0;  ///< six times what the volume's terms may be off by
+  double rounding_ = 0;  ///< six times the error bound of the volume's terms
   double layers_ = 0;    ///< the bound of volume from moved surfaces
 };
 

@@ -51,7 +51,7 @@ struct alignas(64) PlacedPlanes {
   PointAnd corner[kWidth];
   PointAnd normal[kWidth];  ///< product of two sides, and a bound of the coordinates of these
   /// Along the plane out of the triangle, which lies below the number; its absolute coordinates add
-  /// up to 1, but for rounding.
+  /// up to 1, except for rounding.
   PointAnd edge[3][kWidth];
   /// The block's vertices are between these heights above the plane of `widest`, times the length
   /// of its normal.
@@ -80,7 +80,7 @@ struct alignas(64) TrianglePairs {
   double corner[2][3][3][8] = {};
   std::uint32_t triangle[2][8] = {};
   std::uint32_t count = 0;
-  std::uint32_t asks = 0;  ///< a bit a pair: its blocks may have to be marked as near
+  std::uint32_t unmarked = 0;  ///< a bit a pair: its blocks may have to be marked as near
 };
 
 /// A pending pair of nodes.
@@ -92,7 +92,7 @@ struct BoxPair {
 /// A pending pair of nodes, and a lower bound of its distance.
 struct GapPair {
   double squared;
-  float order;  ///< the less, the likelier it holds the answer
+  float order;  ///< pairs with smaller numbers are searched first
   std::uint32_t a, b;
   std::uint8_t level_a, level_b;
 };
@@ -108,7 +108,7 @@ struct CrossedBlock {
   // For each edge that is pierced:
   std::int8_t sum[3 * kWidth];     ///< its entries less its exits
   std::int8_t first[3 * kWidth];   ///< 1 if it enters first, −1 if it leaves first, 0 if unclear
-  std::int8_t middle[3 * kWidth];  ///< `sum` of places that are nearer to its first corner
+  std::int8_t middle[3 * kWidth];  ///< `sum` over the half nearer to its first corner
   double first_t[3 * kWidth], first_error[3 * kWidth];
 
   exact::Point at(std::uint32_t v) const noexcept {
@@ -123,17 +123,17 @@ class Crossings {
  public:
   /// Eight are loaded and stored at once, so up to seven more are touched.
   Crossings(std::uint32_t most, const MemoryHooks& hooks)
-      : room_((most + 15) / 8 * 8),
-        numbers_(hooked_array<double>(hooks, std::size_t{kNumbers} * room_)),
-        triangle_(hooked_array<std::uint32_t>(hooks, 2 * std::size_t{room_})) {}
+      : capacity_((most + 15) / 8 * 8),
+        numbers_(hooked_array<double>(hooks, std::size_t{kNumbers} * capacity_)),
+        triangle_(hooked_array<std::uint32_t>(hooks, 2 * std::size_t{capacity_})) {}
 
   /// The numbers of an end, where an edge of one solid pierces a triangle of the other. All
   /// segments that end there have the same bits.
   enum EndNumber {
-    kFrom = 0,    ///< x, y, z of the end of the edge that is nearer to the triangle's plane
-    kOffset = 3,  ///< from there to the place: it keeps its digits where that is next to the end
-    kT = 6,       ///< the position along the edge, from its first corner in this triangle
-    kTError = 7,  ///< of t
+    kFrom = 0,         ///< x, y, z of the end of the edge that is nearer to the triangle's plane
+    kOffset = 3,       ///< from there to the crossing: stays accurate next to the end
+    kT = 6,            ///< the position along the edge, from its first corner in this triangle
+    kTError = 7,       ///< of t
     kHeightError = 8,  ///< heights of the edge's ends over the triangle, times twice its area, are
                        ///< off by this together
     kEdge = 9,  ///< its number: A's 0 … 2, B's 3 … 5; and 8 if `from` is its first corner
@@ -182,12 +182,12 @@ class Crossings {
 
  private:
   static constexpr int kNumbers = 2 * kEndNumbers + 8;
-  double* at(int number) noexcept { return numbers_.get() + std::size_t{room_} * number; }
+  double* at(int number) noexcept { return numbers_.get() + std::size_t{capacity_} * number; }
   const double* at(int number) const noexcept {
-    return numbers_.get() + std::size_t{room_} * number;
+    return numbers_.get() + std::size_t{capacity_} * number;
   }
 
-  std::uint32_t room_;
+  std::uint32_t capacity_;
   HookedArray<double> numbers_;
   HookedArray<std::uint32_t> triangle_;
 };
@@ -213,7 +213,7 @@ struct BlockMarks {
   std::uint32_t count = 0;
 };
 
-/// Scratch memory of exact queries, a part of a workspace: all of it grows with its capacity.
+/// Scratch memory of exact queries, a part of a workspace, whose capacity determines its size.
 struct ExactScratch {
   ExactScratch(std::size_t capacity, const MemoryHooks& hooks)
       : most_blocks(static_cast<std::uint32_t>(std::min<std::size_t>(capacity, 1u << 24))),
@@ -248,11 +248,11 @@ struct ExactScratch {
     }
   }
 
-  /// The most pending node pairs: depth first, 255 others for each level, and both trees are opened
-  /// together.
+  /// Bound of the pending node pairs: a depth-first search leaves 255 others at each level, and
+  /// both trees are opened together.
   static constexpr std::uint32_t kMostWaiting = 256 * 2 * kMaxLevels;
 
-  /// Drops what was placed for another pose: all but A's triangles in A's own frame.
+  /// Drops everything that was placed for another pose: all but A's triangles in A's own frame.
   void forget(std::uint64_t mesh_a) noexcept {
     placed_b->forget();
     placed_a->boxes.forget();

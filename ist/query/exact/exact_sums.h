@@ -35,7 +35,7 @@ struct ExactPart {
   std::uint64_t id = 0;    ///< lowest pair of triangles on its outline, from 1; 0: it has none
   std::uint32_t kept = 0;  ///< the part that it was added to, or itself
   std::uint32_t slot = kNoIndex;  ///< of its octants; kNoIndex if it is not divided
-  exact::Point centre = {};       ///< centroid from the whole's origin, once there is need of it
+  exact::Point centre = {};       ///< centroid from the whole's origin, if computed
   // For keep_largest():
   double cost = 0;            ///< of adding it to another
   std::uint32_t nearest = 0;  ///< that other
@@ -77,10 +77,9 @@ struct PiercedEnd {
 struct CurveExtent {
   std::uint32_t triangle;  ///< kNoIndex: of several
   exact::Point low, high;  ///< its box
-  exact::Point area;       ///< twice the vector of what it goes around
+  exact::Point area;       ///< twice the vector area that it encloses
 };
 
-/// The working memory of parts and octants.
 struct PartMemory {
   static constexpr std::uint32_t kMostParts = 1024;
   static constexpr std::uint32_t kMostSplit = 64;  ///< parts that are divided into octants
@@ -97,11 +96,11 @@ struct PartMemory {
 
 /// The terms that eight pieces of the boundary add to the sums of an overlap, one per lane.
 struct alignas(64) ExactTerms {
-  /// The tetrahedra of a segment, and of an edge at each of its ends. They are not summed here,
-  /// since digits would be lost where all are large and the overlap is small.
+  /// The tetrahedra of a segment, and of an edge at each of its ends. Summing them here would lose
+  /// digits where all are large and the overlap is small.
   double six_volumes[3][8];
   double moment[3][8], force[3][8], torque[3][8];
-  double rounding[8];  ///< six times what the volume may be off by
+  double rounding[8];  ///< six times the error bound of the volume
 };
 
 /// The terms that eight crossings add to octants, one per lane: triangles of A and of B between the
@@ -117,7 +116,6 @@ struct alignas(64) OctantPieces {
   std::uint8_t octant[6][8];  ///< a bit an axis: the corner's coordinate is not less than 0
   std::uint8_t of_b[4][8];    ///< the triangle is of B's surface
 
-  /// Corner k of a triangle.
   IST_HD int corner(int triangle, int k, std::uint32_t lane) const noexcept {
     if (k == 0) return of_b[triangle][lane];
     return triangle < 2 ? kEnd + (k == 1 ? triangle : 1 - triangle)
@@ -152,7 +150,7 @@ struct PieceMemory {
   CutPieces cut;
   std::int8_t whole[kWidth];  ///< how often the cone over a triangle's edge counts
   bool says;                  ///< a flag from the leading lane to the others
-  std::uint32_t taken;        ///< entries of PartMemory::ends that lists of edges have taken
+  std::uint32_t taken;        ///< entries of PartMemory::ends used by lists of edges
   std::uint32_t part[8];      ///< of a lane's piece; kNoIndex if the piece does not count
   std::uint32_t block[8];     ///< a lane's block that is inside as a whole
 };

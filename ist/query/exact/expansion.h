@@ -56,11 +56,11 @@ class CarefulSum {
   double high_ = 0, low_ = 0;
 };
 
-/// A sum of at most kRoom doubles that do not overlap, without zeros. An empty one is 0.
-template <int kRoom>
+/// A sum of at most kCapacity doubles that do not overlap, without zeros. An empty one is 0.
+template <int kCapacity>
 struct Expansion {
   int count = 0;
-  double part[kRoom];
+  double part[kCapacity];
 
   IST_HD inline int sign() const { return count == 0 ? 0 : part[count - 1] > 0 ? 1 : -1; }
   /// The nearest double, or nearly.
@@ -94,7 +94,6 @@ IST_HD inline Expansion<kA + kB> sum(const Expansion<kA>& a, const Expansion<kB>
   add_parts(a, b, factor, [&](double part) { out.part[out.count++] = part; });
   return out;
 }
-/// The sign of the sum alone.
 template <int kA, int kB>
 IST_HD inline int sign_of_sum(const Expansion<kA>& a, const Expansion<kB>& b, double factor) {
   double largest = 0;
@@ -122,7 +121,6 @@ IST_HD inline Expansion<2 * kA> scaled(const Expansion<kA>& a, double b) {
   return out;
 }
 
-/// a − b of two doubles.
 IST_HD inline Expansion<2> difference(double a, double b) {
   Expansion<2> out;
   double high, low;

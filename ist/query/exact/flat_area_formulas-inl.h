@@ -37,11 +37,10 @@ struct CommonArea {
 };
 
 /// The area that triangles in one plane have in common, over the length of `normal`, A's.
-///
-/// A triangle is the sum of what lies below its edges, signed by the way they go. What two such
-/// areas have in common is the integral of the lower edge, whose parts that do not depend on both
-/// edges add up to 0: ∫ min(e − f, 0) over the x of both is left. No side of a point is asked, so
-/// edges and corners that coincide are nothing special.
+/// A triangle is the signed sum of the areas below its edges, by their direction in x. Two such
+/// areas have the integral of the lower edge in common. Terms that depend on one edge alone cancel,
+/// which leaves ∫ min(e − f, 0) over the x of both. No point is classified, so edges and corners
+/// that coincide need no special case.
 IST_FORMULA CommonArea common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const Vec3& normal) {
   const Real zero = constant(0.0), one = constant(1.0);
   const Real nx = magnitude(normal.x), ny = magnitude(normal.y), nz = magnitude(normal.z);
@@ -63,7 +62,7 @@ IST_FORMULA CommonArea common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const
     for (int j = 0; j < 3; ++j) {
       const FlatEdge f = flat_edge(at[1][j], at[1][(j + 1) % 3]);
       const Real from = greater(e.low, f.low), to = lesser(e.high, f.high);
-      // Beside both edges nothing is below.
+      // Outside the common range of x nothing is below.
       const Mask over = less(from, to);
       const Real first = choose(over, height_at(e, from) - height_at(f, from), zero),
                  last = choose(over, height_at(e, to) - height_at(f, to), zero);

@@ -29,15 +29,15 @@ IST_HD inline void weigh_part(ExactPart* parts, std::uint32_t count, std::uint32
   part.cost = part.sums.volume() * (square * square);
 }
 
-/// Keeps at most `room` parts. The least joins the nearest of those that push like it, if there are
-/// any. Least is by volume, or for octants by volume times the fourth power of the distance to the
-/// one that it joins: a crumb beside a contact goes, a small foot far from it stays.
-IST_HD inline std::uint32_t keep_largest(ExactPart* parts, std::uint32_t size, std::uint32_t room,
+/// Keeps at most `wanted` parts. The least part is merged into the nearest of those that push like
+/// it, or of all if there are none. It is the least by volume or, for octants, by volume times the
+/// fourth power of the distance to its partner: small parts near a large one are merged first.
+IST_HD inline std::uint32_t keep_largest(ExactPart* parts, std::uint32_t size, std::uint32_t wanted,
                                          bool octants) {
   std::uint32_t count = 0;
   for (std::uint32_t p = 0; p < size; ++p)
     if (parts[p].kept == p) parts[count++].listed = p;
-  if (count <= room) return count;
+  if (count <= wanted) return count;
   for (std::uint32_t p = 0; p < size; ++p)
     parts[p].centre = (1 / (24 * parts[p].sums.volume())) * parts[p].sums.moment;
   for (std::uint32_t k = 0; k < count; ++k) {
@@ -47,7 +47,7 @@ IST_HD inline std::uint32_t keep_largest(ExactPart* parts, std::uint32_t size, s
     part.cost = part.sums.volume();
     if (octants) weigh_part(parts, count, parts[k].listed);
   }
-  while (count > room) {
+  while (count > wanted) {
     std::uint32_t least = 0;
     for (std::uint32_t k = 1; k < count; ++k) {
       const ExactPart &x = parts[parts[k].listed], &y = parts[parts[least].listed];
@@ -81,7 +81,7 @@ IST_HD inline double exact_deepest(double volume) noexcept {
   return y;
 }
 
-/// The distance, relative to a solid's radius, within which octants of a contact hold it like one.
+/// Octants of a contact that are closer than this, relative to a solid's radius, are merged.
 inline constexpr double kNearOctants = 0.15;
 
 }  // namespace ist

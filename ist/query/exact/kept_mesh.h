@@ -18,7 +18,6 @@ inline MeshTree mesh_of(const PlacedAsset& placed) noexcept {
   return {asset, *at<MeshHeader>(asset, asset.mesh)};
 }
 
-/// The same for placed assets.
 inline double moved_by_poses(const PlacedAsset& a, const PlacedAsset& b, const MeshTree& mesh_b,
                              const RelativePose& pose) noexcept {
   const auto offset = [](const PlacedAsset& placed) {

@@ -29,7 +29,7 @@ double side_of(const MeshTree& a, const MeshTree& b, double scale) {
   return 0.5 * std::min(1 / std::sqrt(a.level[0].count), scale / std::sqrt(b.level[0].count));
 }
 
-// Relative to such a side.
+// Margins relative to such a side.
 constexpr double kLeastMargin = 0.007, kMostMargin = 0.3;
 // The number of steps that a margin allows for. More steps keep more pairs and need fewer searches.
 constexpr double kMostSteps = 3, kLeastSteps = 1.5;
@@ -69,17 +69,19 @@ bool KeptRing::holds(KeptPairs& kept, const MeshTree& b) const noexcept {
   return true;
 }
 
-bool KeptRing::serves(KeptPairs& kept, const MeshTree& b, double room) const noexcept {
-  return holds(kept, b) && kept.moved + std::max(0.0, room - kept.room) < kept.margin;
+bool KeptRing::serves(KeptPairs& kept, const MeshTree& b, double tolerance) const noexcept {
+  return holds(kept, b) && kept.moved + std::max(0.0, tolerance - kept.tolerance) < kept.margin;
 }
 
-void KeptRing::begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept {
+void KeptRing::begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b,
+                     double tolerance) noexcept {
   const double side = side_of(a, b, kept.last.scale);
-  kept.margin = std::clamp(kept.steps * kept.step, kLeastMargin * kept.steps * side, kMostMargin * side);
+  kept.margin =
+      std::clamp(kept.steps * kept.step, kLeastMargin * kept.steps * side, kMostMargin * side);
   if (kept.margin < kLeastSteps * kept.step) kept.margin = 0;
   kept.steps = std::min(1.1 * kept.steps, kMostSteps);
   kept.found_at = kept.last;
-  kept.room = room;
+  kept.tolerance = tolerance;
   kept.first = written_;
   kept.count = 0;
   kept.gone = 0;

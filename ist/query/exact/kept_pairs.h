@@ -21,14 +21,14 @@ struct KeptPairs {
   double steps;             ///< the number of steps that the next margin allows for
   Similarity found_at;      ///< B in A when the pairs were found
   double margin;            ///< A's unit frame; 0: none are kept
-  double room;              ///< the tolerance of the search that found them
+  double tolerance;         ///< the tolerance of the search that found them
   double moved;             ///< since they were found; set by KeptRing::holds
   std::uint64_t first;      ///< in the ring
   std::uint32_t count;
   std::uint64_t nearest = kNone;  ///< for distances: the pair that the last query found
   double apart = 0;  ///< for distances: a lower bound of the last query's; 0 if unknown
   double horizon =
-      0;  ///< for distances: pairs that are not kept were no nearer when the list was made
+      0;  ///< for distances: a lower bound for pairs that are not kept, when the list was made
   double gone = 0;  ///< for distances: the length of B's path since, step by step
   /// A hash of crossings that are all connected, and of what they surround (ExactParts); 0 if
   /// unknown.
@@ -48,13 +48,13 @@ class KeptRing {
   /// The kept pairs of the caller's pair `id`, for a query at `pose`.
   KeptPairs& of(std::uint32_t id, const MeshTree& a, const MeshTree& b,
                 const Similarity& pose) noexcept;
-  /// True if its pairs are all that a search with tolerance `room` can find.
-  bool serves(KeptPairs& kept, const MeshTree& b, double room) const noexcept;
+  /// True if its pairs are all that a search with tolerance `tolerance` can find.
+  bool serves(KeptPairs& kept, const MeshTree& b, double tolerance) const noexcept;
   /// True if the list is still in the ring. Sets kept.moved.
   bool holds(KeptPairs& kept, const MeshTree& b) const noexcept;
   /// Empties the list and sets kept.margin, by which a search looks ahead while it adds pairs in
   /// order. 0 if keeping does not pay.
-  void begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept;
+  void begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double tolerance) noexcept;
   std::uint64_t most() const noexcept { return mask_ + 1; }  ///< the most that one list may have
   /// Drops a list with too many pairs. The next margin will be smaller.
   static void give_up(KeptPairs& kept) noexcept;

@@ -49,9 +49,9 @@ IST_HD inline bool apart_along_axes(const MeshBox& a, const MeshBox& b, const Si
   return false;
 }
 
-/// True if boxes show that two solids neither overlap nor touch. Parts that are moved out of a mate
-/// have many triangles that a search by boxes in float cannot tell apart. `touch`: the distance
-/// within which they touch, A's unit frame.
+/// True if boxes in double show that two solids neither overlap nor touch. Floats cannot separate
+/// the many triangles of parts that are just outside a mate. `touch`: the distance within which
+/// solids touch, A's unit frame.
 IST_HD inline bool boxes_apart(const MeshBox& a, const MeshBox& b, const PairPlace& place,
                                double touch) noexcept {
   return apart_along_axes(a, b, place.a_from_b, touch) ||

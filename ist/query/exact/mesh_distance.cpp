@@ -26,9 +26,9 @@ class MeshGapSearch {
   static constexpr double kMargin = 1.2;
   /// A flag of a kept bound: a later step found it, and B's path until then is added.
   static constexpr std::uint64_t kFoundAgain = std::uint64_t{1} << 32;
-  /// The number of pairs of triangles that wait for others. Eight are measured in the same time.
+  /// The number of pairs of triangles that may be pending. Eight are measured in the same time.
   static constexpr std::uint32_t kFew = 4;
-  /// After so many pairs without a better one, planes in double are tried.
+  /// Planes in double are tried after this many pairs without a better one.
   static constexpr std::uint32_t kVain = 32;
   /// A block this many times as large as a node is bounded by its triangles, not by its box.
   static constexpr double kMuchLarger = 3;
@@ -104,15 +104,15 @@ class MeshGapSearch {
     toward_ = level_ = toward;
     faces_.reset();
     const bool known = dot(toward, toward) > 0;
-    axes_ = known ? axes_along(toward) : WayAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    axes_ = known ? axes_along(toward) : GapAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     if (!known) return;
-    const WayAxes to_a = seen_back(axes_, asked_.b_from_a, scale_);
+    const GapAxes to_a = seen_back(axes_, asked_.b_from_a, scale_);
     single_ ? single_a_.turn(axes_) : double_a_.turn(axes_);
     single_ ? single_b_.turn(to_a) : double_b_.turn(to_a);
   }
 
-  /// Sets the limit beyond which pairs do not matter. Pairs that later steps may bring as near are
-  /// kept.
+  /// Sets the limit beyond which pairs do not matter. Pairs that later steps may bring within it
+  /// are kept.
   void limit_to(double distance) {
     nearest_limit_ = distance;
     limit_ = distance + ahead_;
@@ -173,22 +173,22 @@ class MeshGapSearch {
     out_.a = best_.on_a;
     out_.b = best_.on_a + best_.between;
     out_.distance = best_.least > 0 ? std::sqrt(best_.squared) : 0;
-    // From the pair that answers, since which of several equal pairs is the least depends on the
-    // search.
+    // Starts from the pair that answers, since which of several equal pairs is the least depends on
+    // the search.
     double nearest = std::sqrt(best_.squared) - best_.rounding;
     for (std::uint32_t i = 0; out_.stopped && i < size_; ++i)
       nearest = std::min(nearest, std::sqrt(waiting_[i].squared));
     out_.least = std::max(0.0, (1 - 1e-12) * nearest - slack_);
   }
 
-  /// Drops the last twelve bits. Parallel faces are equally near except for rounding. With equal
+  /// Drops the last twelve bits: parallel faces are equally near except for rounding. With equal
   /// orders the lowest number comes first, and cannot_answer() prunes the others.
   static float coarse(double x) {
     const auto single = static_cast<float>(std::min(x, 1e37));
     return float_of(bits_of(single) & 0xfffff000u);
   }
 
-  /// Inserts by order from `first` on: the least is on top, and of equal ones the first.
+  /// Inserts by order from `first` on. The least is on top; among equals the first.
   void push(const GapPair& pair, std::uint32_t first) {
     std::uint32_t place = size_++;
     for (; place > first && waiting_[place - 1].order <= pair.order; --place)
@@ -201,7 +201,7 @@ class MeshGapSearch {
       const double least = measure(pair.a, pair.b, std::sqrt(pair.squared));
       if (keep_ != nullptr && least <= limit_)
         keep(std::uint64_t{pair.a} << 32 | pair.b, kept_least(least));
-      // A few pairs wait until eight are full.
+      // A few pairs stay pending until eight are full.
       if (scratch_.pairs->count > kFew) measure_added();
     } else if (single_) {
       open(pair, single_a_, single_b_);
@@ -210,7 +210,7 @@ class MeshGapSearch {
     }
   }
 
-  /// True if a solid contains a shell of the other, B or A.
+  /// True if a solid contains a shell of the other. `b_in_a`: B's in A, else A's in B.
   bool holds(bool b_in_a) const {
     const MeshTree& other = b_in_a ? b_ : a_;
     const MeshOfPair solid =
@@ -222,7 +222,7 @@ class MeshGapSearch {
     return false;
   }
 
-  /// Opens the larger node: its sixteen children against the other's box.
+  /// Opens the larger node: compares its sixteen children with the other's box.
   template <class T>
   void open(const GapPair& pair, const BoxLook<T, double>& at_a, const BoxLook<T, double>& at_b) {
     const bool open_a =
@@ -263,7 +263,7 @@ class MeshGapSearch {
     }
   }
 
-  /// The triangles of the node that is not opened if it is a block and much larger than the other,
+  /// The triangles of the node that stays closed if it is a block and much larger than the other,
   /// else null.
   const BlockFaces* triangles_beside(const GapPair& pair, bool open_a) {
     if ((open_a ? pair.level_b : pair.level_a) != 0) return nullptr;
@@ -280,14 +280,15 @@ class MeshGapSearch {
   }
   /// The axes along which two blocks' triangles are compared. If one block is much larger, they
   /// follow the direction from its nearest triangle to the other block.
-  WayAxes axes_between(std::uint32_t number_a, std::uint32_t number_b) {
+  GapAxes axes_between(std::uint32_t number_a, std::uint32_t number_b) {
     const GapPair blocks{0, 0, number_a, number_b, 0, 0};
     for (const bool of_a : {false, true}) {
       const BlockFaces* const larger = triangles_beside(blocks, of_a);
       if (larger == nullptr) continue;
-      const exact::Point way = larger->way_to(box(of_a, 0, of_a ? number_a : number_b).middle);
-      if (const double length = std::sqrt(dot(way, way)); length > 0)
-        return axes_along((1 / length) * way);
+      const exact::Point between =
+          larger->vector_to(box(of_a, 0, of_a ? number_a : number_b).middle);
+      if (const double length = std::sqrt(dot(between, between)); length > 0)
+        return axes_along((1 / length) * between);
     }
     return axes_;
   }
@@ -314,7 +315,7 @@ class MeshGapSearch {
       for (const std::uint32_t k : set_bits(lanes))
         add(kWidth * number_a + i, of_a, kWidth * number_b + k, of_b);
     };
-    const WayAxes axes = axes_between(number_a, number_b);
+    const GapAxes axes = axes_between(number_a, number_b);
     if (!single_) {
       const BlockExtents a(of_a, a_.blocks[number_a], axes), b(of_b, b_.blocks[number_b], axes);
       for (const std::uint32_t i : set_bits(a.near(b, squared_limit_) & all_a))
@@ -336,22 +337,22 @@ class MeshGapSearch {
   }
 
   /// True if no triangles of two blocks are nearer than the best pair, up to rounding, and they
-  /// come after it. So are most pairs of parallel faces, which floats cannot distinguish from
-  /// nearer ones. `first`: the first of their pairs.
+  /// come after it. This excludes most pairs of parallel faces, which floats cannot distinguish
+  /// from nearer ones. `first`: the first of their pairs.
   bool cannot_answer(double ahead, std::uint64_t first) const {
     const double distance = std::sqrt(best_.least);
     return best_.pair < first && distance >= 4 * best_.rounding &&
            ahead >= distance - 0.5 * best_.rounding;
   }
 
-  /// True if many pairs were measured in vain, and planes have excluded some if they were asked.
+  /// True if many pairs were measured in vain, and planes, if tried, have excluded some.
   bool planes_pay() const {
     const std::uint32_t vain = out_.tests - better_at_;
     return vain > kVain && vain < 2 * kVain + 4 * excluded_;
   }
-  /// The triangles of B among `lanes` that no plane of A's triangle i or of theirs keeps as far
-  /// from it as the best pair is, up to rounding; or all, if they come before that pair. Parts that
-  /// fit have many that are as near, which floats cannot distinguish from nearer ones.
+  /// The triangles of B among `lanes` that planes do not prove to be as far from A's triangle i as
+  /// the best pair, up to rounding; all of them if they come before that pair. Parts that fit have
+  /// many that are as near, which floats cannot distinguish from nearer ones.
   HWY_NOINLINE std::uint32_t within_planes(std::uint64_t first, std::uint32_t i,
                                            std::uint32_t lanes, std::optional<Meeting>& meeting) {
     best_planes_.touch = std::sqrt(best_.least) - 0.5 * best_.rounding;
@@ -395,7 +396,7 @@ class MeshGapSearch {
     out_.tests += count;
     PairGaps gaps;
     std::uint32_t unclear = measure_pairs(pairs, count, slack_, gaps);
-    // Where two share a point the answer is 0, whether triangles cross or not.
+    // If two share a point, the answer is 0, whether triangles cross or not.
     if (*std::min_element(gaps.squared, gaps.squared + count) <= 0) unclear = 0;
     for (; unclear != 0 && !out_.overlap; unclear &= unclear - 1) {
       const auto n = static_cast<std::uint32_t>(std::countr_zero(unclear));
@@ -455,9 +456,9 @@ class MeshGapSearch {
   double most_, nearest_limit_ = 0, ahead_ = 0, limit_ = 0;
   double squared_limit_ = 0;
   NearestTriangles best_;
-  /// The last direction of the best pair, and the normal if that is of parallel faces.
+  /// The last direction of the best pair, and its normal if the faces are parallel.
   exact::Point toward_, level_ = {0, 0, 0};
-  WayAxes axes_;
+  GapAxes axes_;
   std::optional<BlockFaces> faces_;  ///< of a block, along the axes
   std::uint32_t faces_of_ = 0;
   bool faces_of_b_ = false;

@@ -36,32 +36,32 @@ IST_HD inline double gap_error(const MeshTree& a, const MeshTree& b, const PairP
 }
 /// For a larger B the fourth powers of lengths would overflow, so A is mapped to its frame instead.
 inline constexpr double kLargestGapScale = 1e30;
-/// The relative rounding within which all pairs of solids that are far apart for their size are
-/// equally near, so that any will do.
+/// Pairs of solids that are far apart for their size are equally near within this relative
+/// rounding, so any pair may answer.
 inline constexpr double kGapsAlike = 1e-13;
-/// The direction between parallel faces is their normal, of which a short difference has few
-/// digits. True if the direction is the normal of triangle t; then `level` is that normal, from A
-/// to B.
-IST_HD inline bool level_with(const exact::Point (&t)[3], const exact::Point& way,
+/// If faces are parallel, the direction between them is their normal, which a short difference
+/// gives with few digits. True if the direction is the normal of triangle t; then `level` is that
+/// normal, from A to B.
+IST_HD inline bool level_with(const exact::Point (&t)[3], const exact::Point& direction,
                               exact::Point& level) {
   const exact::Point n = cross(t[1] - t[0], t[2] - t[0]);
-  const double length = std::sqrt(dot(n, n)), along = dot(n, way);
+  const double length = std::sqrt(dot(n, n)), along = dot(n, direction);
   constexpr double kLevel = 1 - 1e-10;
   if (!(length > 0 && std::abs(along) > kLevel * length)) return false;
   level = ((along > 0 ? 1 : -1) / length) * n;
   return true;
 }
 
-/// The number of node pairs of spheres that are opened for a bound. More of them gain little.
+/// The number of node pairs of spheres that are opened for a bound. More gain little.
 inline constexpr std::uint32_t kGlance = 64;
 
-/// The nearest two triangles so far; of those that are equally near up to rounding, the ones with
-/// the lowest numbers.
+/// The nearest two triangles so far; among those that are equally near up to rounding, the ones
+/// with the lowest numbers.
 struct NearestTriangles {
   static constexpr std::uint64_t kNone = ~std::uint64_t{0};
 
   double rounding;                            ///< of a distance
-  double least = HUGE_VAL, alike = HUGE_VAL;  ///< squared; up to there all is as near as the least
+  double least = HUGE_VAL, alike = HUGE_VAL;  ///< squared; up to `alike` all count as equal
   double squared = HUGE_VAL;
   std::uint64_t pair = kNone;            ///< A's << 32 | B's
   exact::Point on_a = {}, between = {};  ///< from there to B's
@@ -71,16 +71,16 @@ struct NearestTriangles {
     least = found;
     alike = (std::sqrt(least) + rounding) * (std::sqrt(least) + rounding);
   }
-  /// True if a pair that was met answers now.
+  /// True if this pair replaces the answer.
   IST_HD bool wants(double found, std::uint64_t name) const {
     return found <= alike && !(squared <= alike && pair < name);
   }
   IST_HD void set(double found, std::uint64_t name, const exact::Point& at,
-                  const exact::Point& way) {
+                  const exact::Point& vector) {
     squared = found;
     pair = name;
     on_a = at;
-    between = way;
+    between = vector;
   }
 };
 

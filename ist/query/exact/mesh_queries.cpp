@@ -18,7 +18,7 @@ struct WaitingNode {
   std::uint32_t number;
 };
 
-/// A depth-first stack. Of a node's sixteen children the one with the least key comes first.
+/// A depth-first stack. Among a node's sixteen children the one with the least key comes first.
 class NodeStack {
  public:
   explicit NodeStack(const MeshTree& mesh) noexcept { nodes_[size_++] = {0, mesh.top, 0}; }
@@ -50,9 +50,9 @@ void corners_of(const MeshTree& mesh, const MeshBlock& block, std::uint32_t t,
 }
 
 /// A segment from p to q, and the triangles that it may cross.
-class Way {
+class Segment {
  public:
-  Way(const Point& p, const Point& q) noexcept : p_(p), q_(q) {
+  Segment(const Point& p, const Point& q) noexcept : p_(p), q_(q) {
     const double along[3] = {q.x - p.x, q.y - p.y, q.z - p.z};
     for (int k = 0; k < 3; ++k) {
       from_[k] = (&p.x)[k];
@@ -107,7 +107,7 @@ class Way {
       if (exact::enters(p_, q_, corners, true, {0, 0, 0}) == 0) continue;
       const Point normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
       const double climbed = dot(normal, corners[0] - p_), climb = dot(normal, q_ - p_);
-      // If it hardly climbs, the corners are more accurate.
+      // If the edge hardly climbs, the corners are more accurate.
       const double t_plane = climb != 0 && std::abs(climbed) <= 2 * std::abs(climb)
                                  ? climbed / climb
                                  : 0.5 * (first + last);
@@ -132,24 +132,24 @@ bool is_inside(const MeshOfPair& solid, const Point& p, const Point& aside) noex
 }
 
 MeshHit first_hit(const MeshTree& mesh, const Point& p, const Point& q) noexcept {
-  const Way way(p, q);
+  const Segment segment(p, q);
   MeshHit best;
   for (NodeStack stack(mesh); !stack.empty();) {
     const WaitingNode node = stack.pop();
     if (node.key > best.t + 4e-15) continue;
     if (node.level == 0) {
-      way.hit(mesh, node.number, best);
+      segment.hit(mesh, node.number, best);
       continue;
     }
     double key[kWidth];
-    way.enter(mesh.level[node.level].boxes[node.number], key);
+    segment.enter(mesh.level[node.level].boxes[node.number], key);
     stack.push(mesh, node, key, std::min(2.0, best.t + 4e-15));
   }
   return best;
 }
 
 MeshFoot nearest_on(const MeshTree& mesh, const Point& p, double limit) noexcept {
-  // Points that are nearer by no more than rounding need no visit: far away all are equally near.
+  // Points that are nearer by rounding alone need no visit: far away all are equally near.
   constexpr double kNearer = 1 - 4e-15;
   MeshFoot best;
   best.squared = limit * limit;

@@ -97,20 +97,19 @@ IST_HD inline float placing_pad(double scale, const double (&t)[3], const MeshTr
   return static_cast<float>(1e-6 * (2 * scale * mesh.extent() + shift));
 }
 
-/// The distance within which the solid's surface and the mesh are of each other, unit frame.
+/// Bound on the distance between the solid's surface and the mesh, unit frame.
 IST_HD inline double moved_in_mesh(const MeshTree& mesh) noexcept {
   return mesh.header->error + mesh.header->rounding;
 }
 
 /// A bound of the distance of B's vertices from their true places relative to A, A's unit frame. A
-/// rotation has an error of up to 37 roundings; points that it maps, and the translation between
-/// the frames, have at most 45 with all that follows. `offset`: [u] of a unit frame's middle from
-/// its solid's origin.
+/// rotation has an error of up to 37 roundings, mapped points and the translation between the
+/// frames at most 45 in all. `offset`: [u] of a unit frame's middle from its solid's origin.
 IST_HD inline double moved_by_poses(const double (&t_a)[3], double offset_a, const double (&t_b)[3],
                                     double offset_b, double extent_b,
                                     const PairPlace& pose) noexcept {
   const Vec3 between = vec3(t_b) - vec3(t_a), shift = vec3(pose.a_from_b.t);
-  // In Eigen's order.
+  // Summed in Eigen's order.
   const double far = std::sqrt(shift.x * shift.x + (shift.y * shift.y + shift.z * shift.z));
   return 1.1 * exact::kHalfUnit *
          (45 * (1.8 * pose.a_from_b.scale * extent_b +

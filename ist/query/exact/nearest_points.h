@@ -6,8 +6,8 @@
 
 #include "query/exact/orientation.h"
 
-// The nearest points of segments and triangles, in double. They are on them up to rounding, so that
-// they bound the distance from above however thin these are.
+// The nearest points of segments and triangles, in double. Points are on them up to rounding, so
+// they bound the distance from above however thin the triangles are.
 
 namespace ist::exact {
 
@@ -16,7 +16,7 @@ struct NearestPair {
   double squared = HUGE_VAL;  ///< distance
   Point a = {}, b = {};
 
-  /// Takes these points if they are nearer; returns if so.
+  /// Takes these points if they are nearer, and returns true if so.
   bool take(const Point& on_a, const Point& on_b) noexcept {
     const Point between = on_b - on_a;
     const double s = dot(between, between);
@@ -53,7 +53,6 @@ struct FlatTriangle {
         squared_normal(dot(normal, normal)) {}
 };
 
-/// The nearest point of a triangle.
 inline Point nearest_on_triangle(const Point& p, const FlatTriangle& t) noexcept {
   double weight[3];
   bool inside = t.squared_normal > 0;
@@ -76,7 +75,7 @@ inline Point nearest_on_triangle(const Point& p, const FlatTriangle& t) noexcept
 using Heights = std::array<double, 3>;
 
 /// Takes the nearest points of two triangles that do not cross, if they are nearer. `enough`: any
-/// that are nearer will do.
+/// that are nearer suffice.
 inline void take_nearest(const FlatTriangle& a, const FlatTriangle& b, const Heights& over_a,
                          const Heights& over_b, NearestPair& best, bool enough = false) noexcept {
   for (int k = 0; k < 3; ++k) {
@@ -87,8 +86,8 @@ inline void take_nearest(const FlatTriangle& a, const FlatTriangle& b, const Hei
         best.take(nearest_on_triangle(b.corner[k], a), b.corner[k]) && enough)
       return;
   }
-  // Edges whose nearest points are not corners, by cross products, which keep the digits of nearly
-  // parallel edges.
+  // Edges whose nearest points are not corners: cross products keep the digits of nearly parallel
+  // edges.
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
       const Point n = cross(a.side[i], b.side[j]), w = b.corner[j] - a.corner[i];

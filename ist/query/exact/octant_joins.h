@@ -25,7 +25,7 @@ IST_HD inline Corner between(const Corner& from, const Corner& to, int plane) no
   Corner out = {{0, 0, 0}, from.octant};
   for (int k = 0; k < 3; ++k) {
     if (k != plane) out.at[k] = from.at[k] + t * (to.at[k] - from.at[k]);
-    // If both ends are on one side of a plane, so is the point, whatever rounding does.
+    // If both ends are on one side of a plane, so is the point: rounding must not change that.
     const int bit = 1 << k;
     if (k > plane && ((from.octant ^ to.octant) & bit) != 0)
       out.octant = (out.octant & ~bit) | (out.at[k] >= 0 ? bit : 0);
@@ -72,7 +72,7 @@ IST_HD inline exact::OctantTerms terms_of(bool of_b, double times, const Corner&
   return exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, p.point(), q.point(), r.point());
 }
 
-/// Cuts a triangle down to a piece, whose number has a digit from 0 to 2 for each plane, the
+/// Finds a piece of the triangle by its number, which has a digit from 0 to 2 for each plane, the
 /// first plane's in front. False if there is no such piece.
 IST_HD_COLD bool find_piece(std::uint32_t number, Corner (&at)[3]) noexcept {
   std::uint32_t digits = number, unit = CutPieces::kMost / 3;
@@ -89,10 +89,10 @@ IST_HD_COLD bool find_piece(std::uint32_t number, Corner (&at)[3]) noexcept {
   return true;
 }
 
-/// Relative to a part's sums: an octant with less is left to the others.
+/// An octant with a smaller share of the part's sums is left to the others.
 inline constexpr double kRounding = 1e-9;
 
-/// From 1 at `low` to 0 at twice that, or the other way round.
+/// From 1 at `low` to 0 at twice that, or the reverse.
 IST_HD inline double falls(double x, double low) { return 1 - smooth_step(x / low - 1); }
 IST_HD inline double rises(double x, double low) { return smooth_step(x / low - 1); }
 
@@ -103,7 +103,7 @@ IST_HD void give(double share, T& out, T& in) {
   out = share == 1 ? part - part : out - part;
 }
 
-/// Moves a share of what one octant has to another.
+/// Moves a share of one octant's sums to another.
 IST_HD inline void move(OctantSums& from, double share, OctantSums& to) {
   give(share, from.six_volumes, to.six_volumes);
   give(share, from.moment, to.moment);
@@ -145,26 +145,26 @@ IST_HD inline double oneness(const OctantSums& x, const OctantSums& y, double ne
   return exact::greater(falls(less / more, 1.0 / 64), falls(apart, near));
 }
 
-/// Relative to what is near: a part that is no thicker along an axis is not cut across it.
+/// A part that is no thicker than this along an axis, relative to `near`, is not cut across it.
 inline constexpr double kThin = 1.0 / 8;
 
 /// The degree to which a part is no longer than `length` along an axis.
 IST_HD inline double shortness(const OctantSums& box, int axis, double length) {
   return falls(box.high[axis] - box.low[axis], length);
 }
-/// The same along all axes.
+/// The same for all axes.
 IST_HD inline double smallness(const OctantSums& box, double length) {
   return exact::lesser(exact::lesser(shortness(box, 0, length), shortness(box, 1, length)),
                        shortness(box, 2, length));
 }
 
-/// True if it is longer than that along all axes.
+/// True if the box is longer than that along all axes.
 IST_HD inline bool is_large(const OctantSums& box, double near) {
   return shortness(box, 0, near) == 0 && shortness(box, 1, near) == 0 &&
          shortness(box, 2, near) == 0;
 }
 
-/// The planes across which octants are not one anyway, a bit for each axis.
+/// The planes across which octants are not joined anyway, a bit for each axis.
 IST_HD inline int planes_of(const OctantSums& box, double near) {
   int planes = 0;
   for (int k = 0; k < 3 && smallness(box, near) < 1; ++k)

@@ -3,10 +3,10 @@
 #include "base/vec3.h"
 #include "query/exact/expansion.h"
 
-// Exact signs of determinants of four points, of which some belong to B. Signs are those of B moved
-// aside by a given tiny vector, and a tie is broken as if B were moved further by an infinitesimal
-// (ε, ε², ε³): then no vertex lies in a plane and no edge meets an edge, whatever the pose, and all
-// signs agree with each other as those of one geometry do. Values are those of B where it is.
+// Exact signs of determinants of four points, some of which belong to B. Signs are those after B
+// has moved by a given tiny vector. A tie is broken as if B moved further by an infinitesimal (ε,
+// ε², ε³). Then no vertex lies in a plane and no edge meets an edge, whatever the pose, and all
+// signs are consistent with one geometry. Values are those of B in place.
 
 namespace ist::exact {
 
@@ -20,8 +20,8 @@ struct Determinant {
   int sign;      ///< never 0
 };
 
-/// Rounded r · (u × v) of rounded differences is off by at most this times r · (u × v) of absolute
-/// values: eight roundings of each product, and some room.
+/// r · (u × v) of rounded differences is off by at most this times r · (u × v) of absolute values:
+/// eight roundings of each product, and some margin.
 inline constexpr double kFilter = 1e-15;
 
 IST_HD inline double absolute_dot(const Point& x, const Point& size) {
@@ -44,13 +44,13 @@ IST_HD_COLD int sign_of_minor(double a1, double a0, double b1, double b0, double
       .sign();
 }
 
-/// The sign of a tie, from the normal u × v along which the infinitesimal goes.
+/// The sign of a tie, from the normal u × v along which the infinitesimal moves.
 IST_HD_COLD int sign_of_tie(const Point& u1, const Point& u0, const Point& v1, const Point& v0,
                             int moved) {
   int sign = sign_of_minor(u1.y, u0.y, u1.z, u0.z, v1.y, v0.y, v1.z, v0.z);
   if (sign == 0) sign = sign_of_minor(u1.z, u0.z, u1.x, u0.x, v1.z, v0.z, v1.x, v0.x);
   if (sign == 0) sign = sign_of_minor(u1.x, u0.x, u1.y, u0.y, v1.x, v0.x, v1.y, v0.y);
-  // For a triangle without area, or parallel edges, any sign will do that is always the same.
+  // For a triangle without area, or parallel edges, any constant sign is correct.
   return sign != 0 ? moved * sign : 1;
 }
 
@@ -65,8 +65,8 @@ IST_HD_COLD Determinant exact_determinant(const Point& r1, const Point& r0, cons
                      uz = difference(u1.z, u0.z);
   const Expansion<2> vx = difference(v1.x, v0.x), vy = difference(v1.y, v0.y),
                      vz = difference(v1.z, v0.z);
-  // In steps, so that few expansions exist at a time: on a GPU they are in each thread's local
-  // memory.
+  // Computed in steps, so that few expansions exist at a time: on a GPU they are in each thread's
+  // local memory.
   Expansion<64> shift_xy;
   const auto xy = [&] {
     const Expansion<16> x = minor(uy, vz, uz, vy), y = minor(uz, vx, ux, vz);
@@ -79,7 +79,7 @@ IST_HD_COLD Determinant exact_determinant(const Point& r1, const Point& r0, cons
   return {det.value(), 0, sign != 0 ? sign : sign_of_tie(u1, u0, v1, v0, moved)};
 }
 
-/// r · (u × v) in doubles, of rounded differences, for many r: sign 0 where it is not certain.
+/// r · (u × v) in doubles, of rounded differences, for many r: sign 0 if it is not certain.
 struct FilteredPlane {
   Point normal, size;
   double shift, shift_error;  ///< the part of the symbolic translation
@@ -93,7 +93,7 @@ struct FilteredPlane {
     shift = dot(by, normal);
     shift_error = kFilter * absolute_dot(by, size);
   }
-  /// `moved`: how much moving points may change it.
+  /// `moved`: a bound of the change by moving points.
   IST_HD Determinant height(const Point& r, double moved = 0) const {
     const double value = dot(r, normal), error = kFilter * absolute_dot(r, size);
     const double signed_value = value + shift;
@@ -116,7 +116,7 @@ IST_HD inline Determinant filtered_determinant(const Point& r1, const Point& r0,
   return filtered_determinant(r.x, r.y, r.z, u.x, u.y, u.z, v.x, v.y, v.z, by.x, by.y, by.z);
 }
 
-/// The same, in doubles where these are certain.
+/// The same, in doubles if these are certain.
 IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Point& u1,
                                       const Point& u0, const Point& v1, const Point& v0, int moved,
                                       const Point& aside) {
@@ -124,7 +124,7 @@ IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Po
   return found.sign != 0 ? found : exact_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
 }
 
-/// In doubles, with a sign that may be 0; or with `kExactly` exactly.
+/// Computed in doubles, with a sign that may be 0; or exactly, with `kExactly`.
 template <bool kExactly>
 IST_HD inline Determinant determinant_of(const Point& r1, const Point& r0, const Point& u1,
                                          const Point& u0, const Point& v1, const Point& v0,
@@ -149,8 +149,8 @@ IST_HD inline Determinant height_over_b(const Point (&b)[3], const Point& a, con
 
 /// The orientation of A's edge p → q about B's edge r → s.
 template <bool kExactly = true>
-IST_HD inline Determinant way_round(const Point& p, const Point& q, const Point& r, const Point& s,
-                                    const Point& aside) {
+IST_HD inline Determinant edge_orientation(const Point& p, const Point& q, const Point& r,
+                                           const Point& s, const Point& aside) {
   return determinant_of<kExactly>(r, p, q, p, s, r, 1, aside);
 }
 
@@ -167,7 +167,7 @@ IST_HD inline bool cross_exactly(const Point (&a)[3], const Point (&b)[3]) {
   for (int k = 0; k < 3; ++k) height[0][k] = height_over_b(b, a[k], still).sign;
   if (alike(height[0])) return false;
   const auto round = [&](int i, int j) {
-    return way_round(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3], still).sign;
+    return edge_orientation(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3], still).sign;
   };
   for (int k = 0; k < 3; ++k) {
     if (height[0][k] != height[0][(k + 1) % 3] && round(k, 0) == round(k, 1) &&
@@ -185,7 +185,7 @@ IST_HD inline bool cross_exactly(const Point (&a)[3], const Point (&b)[3]) {
 template <bool kExactly = true>
 IST_HD inline int enters(const Point& p, const Point& q, const Point (&t)[3], bool of_b,
                          const Point& aside, bool& unsure) {
-  int sign[2], way[3];
+  int sign[2], sense[3];
   bool all = true;
   for (int k = 0; k < 2; ++k) {
     sign[k] = (of_b ? height_over_a<kExactly>(t, k == 0 ? p : q, aside)
@@ -195,16 +195,16 @@ IST_HD inline int enters(const Point& p, const Point& q, const Point (&t)[3], bo
   }
   if (all && sign[0] == sign[1]) return 0;
   for (int k = 0; k < 3; ++k) {
-    way[k] = (of_b ? way_round<kExactly>(t[k], t[(k + 1) % 3], p, q, aside)
-                   : way_round<kExactly>(p, q, t[k], t[(k + 1) % 3], aside))
-                 .sign;
-    all = all && way[k] != 0;
+    sense[k] = (of_b ? edge_orientation<kExactly>(t[k], t[(k + 1) % 3], p, q, aside)
+                     : edge_orientation<kExactly>(p, q, t[k], t[(k + 1) % 3], aside))
+                   .sign;
+    all = all && sense[k] != 0;
   }
-  // Two different signs prove that the line misses the triangle, whatever the third is.
-  const int least =
-      way[0] < way[1] ? (way[0] < way[2] ? way[0] : way[2]) : (way[1] < way[2] ? way[1] : way[2]);
-  const int most =
-      way[0] > way[1] ? (way[0] > way[2] ? way[0] : way[2]) : (way[1] > way[2] ? way[1] : way[2]);
+  // Two different signs prove that the line misses the triangle, whatever the third sign is.
+  const int least = sense[0] < sense[1] ? (sense[0] < sense[2] ? sense[0] : sense[2])
+                                        : (sense[1] < sense[2] ? sense[1] : sense[2]);
+  const int most = sense[0] > sense[1] ? (sense[0] > sense[2] ? sense[0] : sense[2])
+                                       : (sense[1] > sense[2] ? sense[1] : sense[2]);
   if (least < 0 && most > 0) return 0;
   unsure = unsure || !all;
   return all ? direction(sign[0]) : 0;

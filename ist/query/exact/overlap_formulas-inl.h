@@ -6,15 +6,15 @@
 /// The point where an edge from p to q crosses a plane.
 struct EdgeEnd {
   Vec3 from;         ///< the end of the edge that is nearer to the plane
-  Vec3 offset;       ///< from there to the place: it keeps its digits where that is next to the end
+  Vec3 offset;       ///< from there to the crossing: stays accurate next to the end
   Real share;        ///< the offset as a share of the edge
   Real heights;      ///< of both ends together; 1 if they are rounded to 0
-  Mask flat;         ///< they are
+  Mask flat;         ///< they are rounded to 0
   Mask from_second;  ///< the nearer end is q
 };
 
-/// Computes the point from heights above the plane: from the nearer end, or if both are equally
-/// near from the first in space, so that both triangles at an edge agree.
+/// Computes the point from heights above the plane. It starts from the nearer end, or if both are
+/// equally near from the first in space, so that both triangles at an edge agree.
 IST_FORMULA EdgeEnd edge_end(const Vec3& p, const Vec3& q, Real height_p, Real height_q) {
   const Real hp = magnitude(height_p), hq = magnitude(height_q), whole = hp + hq;
   const Mask before =
@@ -41,16 +41,17 @@ IST_FORMULA Real apex_of(Real first, Real second, Real third) {
 struct PieceTerms {
   Real six_volumes[3];  ///< of tetrahedra, which are summed one by one since they may cancel
   Vec3 moment, force, torque;
-  Real rounding;  ///< six times what the volume may be off by
+  Real rounding;  ///< six times the error bound of the volume
 };
 
-/// A segment that two triangles share, and pierced edges opposite to an apex from their nearer ends
-/// on. A cone from the origin over a part of a triangle is made of tetrahedra with an edge from the
-/// origin to the triangle's apex; segments that two triangles share bound both of their parts.
+/// The terms of a segment that two triangles share, and of pierced edges opposite to an apex, from
+/// their nearer ends on. A cone from the origin over a part of a triangle is made of tetrahedra
+/// with an edge from the origin to the triangle's apex; shared segments bound the parts of both
+/// triangles.
 ///
-/// `near`: an end's nearer end of its edge; `apex`: of A's and of B's triangle; `by_b`: whose edge
-/// an end is of; `opposite`: 1 where its edge is opposite to its triangle's apex and enters, −1
-/// where it leaves, else 0; `height_error`: of both ends of an edge together.
+/// `near`: an end's nearer end of its edge; `apex`: of A's and of B's triangle; `by_b`: an end is
+/// on B's edge; `opposite`: 1 if its edge is opposite to its triangle's apex and enters, −1 if it
+/// leaves, else 0; `height_error`: of both ends of an edge together.
 IST_FORMULA void segment_terms(const Vec3 (&near)[2], const Vec3 (&offset)[2],
                                const Vec3 (&apex)[2], const Mask (&by_b)[2],
                                const Real (&opposite)[2], const Real (&height_error)[2],
@@ -85,7 +86,7 @@ IST_FORMULA void segment_terms(const Vec3 (&near)[2], const Vec3 (&offset)[2],
 }
 
 /// The cone over the edge opposite to a triangle's apex, `count` times. It has neither force nor
-/// torque, and but one tetrahedron.
+/// torque, and only one tetrahedron.
 IST_FORMULA void cone_terms(Real count, const Vec3& apex, const Vec3& next, const Vec3& last,
                             PieceTerms& out) {
   const Vec3 u = next - apex, v = last - apex;

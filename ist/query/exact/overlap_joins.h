@@ -7,7 +7,7 @@
 #include "query/exact/exact_sums.h"
 #include "query/exact/mesh_tree.h"
 
-// Joins what is connected in an overlap, on the host and on a GPU.
+// Joins the connected elements of an overlap, on the host and on a GPU.
 
 namespace ist {
 
@@ -33,7 +33,7 @@ IST_HD void heap_sort(T* items, std::uint32_t count, const Less& less) {
   }
 }
 
-/// The number of bits of a triangle's name, so that eight times a pair's name fits into 64.
+/// The number of bits of a triangle's name: eight times a pair's name fits into 64.
 inline constexpr int kTriangleBits = 28;
 
 template <class Visit>
@@ -59,8 +59,8 @@ IST_HD inline std::uint32_t power_from(std::uint32_t n) {
 /// - load(at), store(at, to), add(at, by), exchange(at, to), replace(at, from, to), least(at, x),
 ///   most(at, x): atomic accesses. add(), exchange() and replace() return the value before
 /// - mesh(side), memory(), pieces(), whole(): PartMemory, PieceMemory, the whole's ExactSums
-/// - crossings(), triangle(side, i), end_of(i, e), way_of(i, e), place_of(i, e): crossings in the
-///   order of the meshes; an end's share of the way along its edge, and its place from the origin
+/// - crossings(), triangle(side, i), end_of(i, e), share_of_edge(i, e), place_of(i, e): in the
+///   order of the meshes; an end's position on its edge, 0 to 1, and its place from the origin
 /// - first_record(side), end_record(side), side_of(r), record_of(side, block): crossed blocks,
 ///   those of a side among these numbers
 /// - block_of(r), inside_of(r), pierced_of(r), opposite_edge(r, triangle), at(r, vertex)
@@ -254,7 +254,7 @@ class OverlapJoins : public Overlap {
     }
   }
 
-  /// Joins a curve that is in one triangle and surrounds what is outside to the narrowest curve
+  /// Joins a curve that is in one triangle and surrounds an outside region to the narrowest curve
   /// around it there, or to the triangle's corners.
   IST_HD void join_holes(int side) noexcept {
     CurveExtent* const curves = memory().curves;
@@ -340,12 +340,11 @@ class OverlapJoins : public Overlap {
 
   /// Returns the element to which the middle of the edge belongs. `first`: of the list of its ends.
   ///
-  /// Where copies coincide ends lie nearer to each other than they are known, and their order may
-  /// say that nothing is inside in the middle: the nearest end stands for it, so that sums lose
-  /// nothing.
+  /// If copies coincide, ends may be nearer to each other than their error, and their order may
+  /// show nothing inside in the middle. The nearest end then represents it, so sums lose nothing.
   IST_HD std::uint32_t join_edge(std::uint32_t r, std::uint32_t edge,
                                  std::uint32_t first) noexcept {
-    // The ends of edges are sorted where those of curves were, each lane's in a place of its own.
+    // The ends of edges are sorted in the memory of curves' ends, each lane's in its own part.
     PiercedEnd* ends = memory().ends;
     std::uint32_t count = 0;
     if (width() > 1) {
@@ -356,7 +355,7 @@ class OverlapJoins : public Overlap {
     }
     for (std::uint32_t i = first; i != kNoIndex;) {
       const std::uint64_t next = memory().other_keys[i];
-      ends[count++] = {next, this->way_of(i / 2, static_cast<int>(i % 2)), i / 2, 0, false};
+      ends[count++] = {next, this->share_of_edge(i / 2, static_cast<int>(i % 2)), i / 2, 0, false};
       i = static_cast<std::uint32_t>(next);
     }
     by_names_ = by_names_ && count <= 2;
@@ -418,7 +417,7 @@ class OverlapJoins : public Overlap {
     }
   }
 
-  /// Joins blocks inside as a whole with each other and with vertices inside of crossed ones.
+  /// Joins blocks inside as a whole with each other and with the inside vertices of crossed blocks.
   IST_HD void join_blocks(int side) noexcept {
     const MeshTree& all = mesh(side);
     for_each_of_lane(side, [&](std::uint32_t b) {

@@ -15,13 +15,13 @@ namespace ist {
 /// on a GPU.
 ///
 /// Every piece of both surfaces is cut by three planes through the centroid, which add nothing to
-/// cones from there: volumes are exact. Pieces change over where they have no area, so the sums are
-/// continuous in the pose. An octant's gradient is half of what each of the two surfaces has in it.
-/// They agree where a contact is thin. Octants join where they do not. Where a part is thin along
-/// an axis, its octants on both sides of the middle are one, and it is not cut there.
+/// cones from there: volumes are exact. Pieces change octants where they have no area, so the sums
+/// are continuous in the pose. An octant's gradient is half of each surface's. These agree where a
+/// contact is thin; elsewhere octants are joined. If a part is thin along an axis, its octants on
+/// both sides of the middle are one, and it is not cut there.
 ///
-/// Of `Overlap` it asks besides: map(), A's unit frame from B's; find_octant_pieces(first),
-/// pieces() of eight crossings in its view. All of a team together.
+/// `Overlap` needs also: map(), A's unit frame from B's; find_octant_pieces(first), pieces() of
+/// eight crossings in its view. All of a team call it together.
 template <class Overlap>
 class OverlapOctants : public OverlapParts<Overlap> {
   using Parts = OverlapParts<Overlap>;
@@ -33,16 +33,16 @@ class OverlapOctants : public OverlapParts<Overlap> {
   using Parts::Parts;
 
   /// Divides the kept parts of divide(), along the axes of A or B: those that have a patch's share
-  /// of the volume, if there are `room` patches. Returns the number of octants in
+  /// of the volume, if there are `wanted` patches. Returns the number of octants in
   /// PartMemory::octants, whose names are 8 times the part's plus the octant's number. `near`:
   /// octants that are no farther apart are one.
   IST_HD std::uint32_t split(std::uint32_t parts, bool by_b, double near,
-                             std::uint32_t room) noexcept {
+                             std::uint32_t wanted) noexcept {
     const Similarity& map = this->map();
     for (int k = 0; k < 3; ++k)
       axis_[k] = by_b ? (1 / map.scale) * Point{map.m[k], map.m[3 + k], map.m[6 + k]}
                       : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
-    const double least = this->whole().volume() / static_cast<double>(room);
+    const double least = this->whole().volume() / static_cast<double>(wanted);
     meet();
     if (leads()) pieces().says = begin_octants(parts, least);
     meet();
@@ -199,8 +199,8 @@ class OverlapOctants : public OverlapParts<Overlap> {
     return part == kNoIndex ? kNoIndex : memory().parts[memory().parts[part].kept].slot;
   }
 
-  /// Finds the boxes of parts, and the planes that cut them: those across which octants are not one
-  /// anyway. False if there are none.
+  /// Finds the boxes of parts, and the planes that cut them: those across which octants are not
+  /// joined anyway. False if there are none.
   IST_HD bool find_planes(std::uint32_t parts, double near) noexcept {
     const auto reach = [&](std::uint32_t element, const Point& x) {
       const std::uint32_t slot = slot_of(element);
@@ -329,7 +329,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
     seen.octant[c][l] = static_cast<std::uint8_t>(octant);
     return from;
   }
-  /// The same of a seen vertex.
+  /// The same for a vertex already placed.
   IST_HD Point see_again(std::uint32_t vertex, std::uint32_t c, std::uint32_t l) noexcept {
     OctantPieces& seen = pieces().octants;
     const std::uint32_t of = kVertices + vertex / 8, in = vertex % 8;
@@ -379,8 +379,8 @@ class OverlapOctants : public OverlapParts<Overlap> {
     meet();
   }
 
-  /// Appends the octants of a part. Returns the number written then; `first` if they do not sum to
-  /// the part, as where rounding exceeds it.
+  /// Appends the octants of a part. Returns the new number; `first` if they do not sum to the part,
+  /// for example if rounding exceeds it.
   IST_HD std::uint32_t write_octants(const ExactPart& part, double small, double near,
                                      std::uint32_t first) noexcept {
     const auto in_frame = [&](const Point& v) {
@@ -390,7 +390,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
     const Point centre = sums->centre;
     const double smallness = octants::smallness(*sums, near);
     octants::join(sums, near, small < smallness ? smallness : small);
-    ExactSums missing = part.sums;  // but for rounding nothing
+    ExactSums missing = part.sums;  // nothing but rounding
     const double volume = part.sums.volume();
     double areas = 0;
     std::uint32_t count = first, largest = first;

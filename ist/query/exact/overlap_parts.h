@@ -48,7 +48,7 @@ class OverlapParts : public OverlapJoins<Overlap> {
   using Joins::vertex_element;
   using Joins::width;
 
-  /// `one`: everything that counts is known to be in one part.
+  /// `one`: everything that counts is known to be one part.
   IST_HD void start(bool one) noexcept {
     parts_ = 0;
     one_ = one;
@@ -138,14 +138,14 @@ class OverlapParts : public OverlapJoins<Overlap> {
     return known = part;
   }
 
-  /// The part of an element once parts are summed; kNoIndex if none of its part was summed.
+  /// The part of an element once parts are summed; kNoIndex if nothing of its part was summed.
   IST_HD std::uint32_t known_part(std::uint32_t element) const noexcept {
     if (one_) return 0;
     const std::uint32_t known = memory().part[element];
     return known != kNoIndex ? known : memory().part[top(element)];
   }
 
-  /// The element to which a triangle of a crossed block belongs where it counts as a whole.
+  /// The element to which a triangle of a crossed block belongs if it counts as a whole.
   IST_HD std::uint32_t triangle_element(std::uint32_t r, std::uint32_t t) const noexcept {
     if (one_) return 0;
     const std::uint32_t edge = 3 * t + opposite_edge(r, t);
@@ -157,7 +157,7 @@ class OverlapParts : public OverlapJoins<Overlap> {
   bool one_ = false;  ///< everything that counts is in one part
 
  private:
-  /// Lowers a number that is 0 until it is set.
+  /// Lowers a number; 0 means not yet set.
   IST_HD void lower(std::uint64_t& at, std::uint64_t to) noexcept {
     for (std::uint64_t now = load(at); now == 0 || to < now;) {
       const std::uint64_t before = this->replace(at, now, to);
@@ -248,8 +248,8 @@ class OverlapParts : public OverlapJoins<Overlap> {
     count = 0;
   }
 
-  /// A part with negative volume is the wall of a cavity. It is added to the largest part, the best
-  /// guess from sums.
+  /// A part with negative volume is the wall of a cavity. It is added to the largest part, the most
+  /// likely owner.
   IST_HD void join_cavities() noexcept {
     ExactPart* const parts = memory().parts;
     std::uint32_t largest = 0;

@@ -41,9 +41,9 @@ inline std::uint32_t alike(const std::uint32_t (&bits)[3]) {
 struct alignas(64) PairHeights {
   double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
   double shift[2][8];                 ///< the part of the symbolic translation, its absolute value
-  std::uint32_t positive[2][3] = {};  ///< with B moved aside
+  std::uint32_t positive[2][3] = {};  ///< with the symbolic translation of B
   std::uint32_t certain[2][3] = {};   ///< certain in double
-  std::uint32_t settled[2][3] = {};   ///< wherever points move by the room
+  std::uint32_t settled[2][3] = {};   ///< certain wherever points move within the tolerance
 
   /// The pairs that a plane separates.
   std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
@@ -61,13 +61,13 @@ class PairSigns {
  protected:
   explicit PairSigns(const CrossingSearch& search) : search_(search) {}
 
-  /// `kAsks`: settled signs are wanted.
-  template <bool kAsks>
+  /// `kSettle`: settled signs are wanted.
+  template <bool kSettle>
   HWY_INLINE void find_heights(const TrianglePairs& pairs, std::uint32_t count,
                                PairHeights& out) const {
     const D d;
-    const V room = hn::Set(d, double{search_.room}), filter = hn::Set(d, exact::kFilter);
-    const V two = hn::Set(d, 2.0), six_rooms = hn::Set(d, 6.0) * room;
+    const V tolerance = hn::Set(d, double{search_.tolerance}), filter = hn::Set(d, exact::kFilter);
+    const V two = hn::Set(d, 2.0), six_tolerances = hn::Set(d, 6.0) * tolerance;
     const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
                         hn::Set(d, search_.aside.z)};
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
@@ -86,7 +86,7 @@ class PairSigns {
         const V along = dot(aside, normal), shift = side == 1 ? along : hn::Neg(along);
         const V shift_error = filter * absolute_dot(aside, size);
         hn::Store(hn::Abs(along), d, out.shift[side] + l);
-        const V longest = kAsks ? hn::Max(largest(u), largest(v)) + room : room;
+        const V longest = kSettle ? hn::Max(largest(u), largest(v)) + tolerance : tolerance;
         HWY_UNROLL(3)
         for (int c = 0; c < 3; ++c) {
           const Vec3 r = corner[side][c] - plane[0];
@@ -99,9 +99,9 @@ class PairSigns {
                     out.error[side][c] + l);
           out.positive[side][c] |= mask_bits(d, moved > hn::Zero(d)) << l;
           out.certain[side][c] |= mask_bits(d, away > sure) << l;
-          if constexpr (kAsks) {
+          if constexpr (kSettle) {
             // The effect of the tolerance: six products of three numbers.
-            const V unsettled = sure + six_rooms * longest * (two * largest(r) + longest);
+            const V unsettled = sure + six_tolerances * longest * (two * largest(r) + longest);
             out.settled[side][c] |= mask_bits(d, away > unsettled) << l;
           }
         }
@@ -144,7 +144,7 @@ class PairSigns {
   }
 
   /// The orientations of A's edges about B's, a bit for each pair.
-  struct WaysRound {
+  struct EdgeOrientations {
     std::uint32_t positive[3][3] = {};  ///< [A's edge][B's edge]
     std::uint32_t certain[3][3] = {}, settled[3][3] = {};
 
@@ -185,12 +185,12 @@ class PairSigns {
     }
   };
 
-  template <bool kAsks>
-  HWY_INLINE void find_ways_round(const TrianglePairs& pairs, std::uint32_t count,
-                                  WaysRound& out) const {
+  template <bool kSettle>
+  HWY_INLINE void find_orientations(const TrianglePairs& pairs, std::uint32_t count,
+                                    EdgeOrientations& out) const {
     const D d;
-    const V room = hn::Set(d, double{search_.room});
-    const V filter = hn::Set(d, 6 * exact::kFilter), six_rooms = hn::Set(d, 6.0) * room;
+    const V tolerance = hn::Set(d, double{search_.tolerance});
+    const V filter = hn::Set(d, 6 * exact::kFilter), six_tolerances = hn::Set(d, 6.0) * tolerance;
     const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
                         hn::Set(d, search_.aside.z)};
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
@@ -202,11 +202,11 @@ class PairSigns {
       HWY_UNROLL(3)
       for (int j = 0; j < 3; ++j) {
         edge_b[j] = corner[1][(j + 1) % 3] - corner[1][j];
-        size_b[j] = largest(edge_b[j]) + room;
+        size_b[j] = largest(edge_b[j]) + tolerance;
       }
       for (int i = 0; i < 3; ++i) {
         const Vec3 edge_a = corner[0][(i + 1) % 3] - corner[0][i];
-        const V size_a = largest(edge_a) + room, error_a = filter * size_a;
+        const V size_a = largest(edge_a) + tolerance, error_a = filter * size_a;
         HWY_UNROLL(3)
         for (int j = 0; j < 3; ++j) {
           // The symbolic translation is the ninth rounding.
@@ -215,8 +215,8 @@ class PairSigns {
           const V size = largest(r), error = error_a * size_b[j] * size;
           out.positive[i][j] |= mask_bits(d, value > hn::Zero(d)) << l;
           out.certain[i][j] |= mask_bits(d, away > error) << l;
-          if constexpr (kAsks) {
-            const V moved = six_rooms * (size_a * size_b[j] + size * (size_a + size_b[j]));
+          if constexpr (kSettle) {
+            const V moved = six_tolerances * (size_a * size_b[j] + size * (size_a + size_b[j]));
             out.settled[i][j] |= mask_bits(d, away > error + moved) << l;
           }
         }
@@ -226,8 +226,9 @@ class PairSigns {
 
   /// Decides signs that are not certain by bounds as tight as those of exact::FilteredPlane, where
   /// products of zero coordinates have no rounding.
-  HWY_NOINLINE void find_ways_closer(const TrianglePairs& pairs, const std::uint32_t (&parts)[2][3],
-                                     std::uint32_t which, WaysRound& out) const {
+  HWY_NOINLINE void refine_orientations(const TrianglePairs& pairs,
+                                        const std::uint32_t (&parts)[2][3], std::uint32_t which,
+                                        EdgeOrientations& out) const {
     const D d;
     const V filter = hn::Set(d, exact::kFilter);
     const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
@@ -257,7 +258,7 @@ class PairSigns {
 
   HWY_NOINLINE void find_round_exactly(const TrianglePairs& pairs,
                                        const std::uint32_t (&parts)[2][3], std::uint32_t n,
-                                       WaysRound& out) const {
+                                       EdgeOrientations& out) const {
     const ExactCorners corners(pairs, n);
     const exact::Point(&a)[3] = corners.of[0], (&b)[3] = corners.of[1];
     for (int i = 0; i < 3; ++i)
@@ -265,7 +266,7 @@ class PairSigns {
         if (((parts[0][i] | parts[1][j]) >> n & 1) == 0 || (out.certain[i][j] >> n & 1) != 0)
           continue;
         const int sign =
-            exact::way_round(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3], search_.aside).sign;
+            exact::edge_orientation(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3], search_.aside).sign;
         put(out.positive[i][j], n, sign > 0);
         put(out.certain[i][j], n, true);
       }
@@ -275,12 +276,12 @@ class PairSigns {
   HWY_NOINLINE std::uint32_t find_settled(const TrianglePairs& pairs, std::uint32_t count) const {
     PairHeights heights;
     find_heights<true>(pairs, count, heights);
-    WaysRound round;
+    EdgeOrientations round;
     if ((each(heights.settled[0]) & each(heights.settled[1])) != 0)
-      find_ways_round<true>(pairs, count, round);
+      find_orientations<true>(pairs, count, round);
     return settled(heights, round);
   }
-  static std::uint32_t settled(const PairHeights& heights, const WaysRound& round) {
+  static std::uint32_t settled(const PairHeights& heights, const EdgeOrientations& round) {
     const std::uint32_t apart = heights.apart(heights.settled);
     const std::uint32_t all = each(heights.settled[0]) & each(heights.settled[1]) & ~apart;
     std::uint32_t parts[2][3];
@@ -349,7 +350,7 @@ class PairSigns {
         beyond = hn::Max(beyond, gap * hn::Abs(gap) - reach * reach * dot(axis, axis));
       };
       // Both ends of an edge coincide along its axis except for rounding. For parallel edges the
-      // axis is nothing but rounding.
+      // axis is rounding alone.
       const auto rounding = [&](const Vec3& u, const Vec3& v) {
         const V size_u = largest(u), size_v = largest(v);
         return filter * ((size_u * size_v) * (size_u + size_v));

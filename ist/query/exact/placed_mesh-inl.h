@@ -89,9 +89,9 @@ inline const PlacedBoxes& placed_boxes(const MeshTree& tree, int level, std::uin
       hn::Store(turned, d, out.normal[k] + l);
       shift = shift + turned * hn::Set(d, t[k]);
     }
-    const auto scale = hn::Set(d, static_cast<float>(map.scale)), room = hn::Set(d, 2 * pad);
-    hn::Store((scale * hn::Load(d, from.slab_low + l) + shift) - room, d, out.slab_low + l);
-    hn::Store((scale * hn::Load(d, from.slab_high + l) + shift) + room, d, out.slab_high + l);
+    const auto scale = hn::Set(d, static_cast<float>(map.scale)), margin = hn::Set(d, 2 * pad);
+    hn::Store((scale * hn::Load(d, from.slab_low + l) + shift) - margin, d, out.slab_low + l);
+    hn::Store((scale * hn::Load(d, from.slab_high + l) + shift) + margin, d, out.slab_high + l);
   }
   const std::uint32_t used = used_lanes(tree, level, i);
   for (int k = 0; k < 3; ++k) {
@@ -244,11 +244,12 @@ class PlacedMeshes {
 
 struct OneBox {
   float low[3], high[3];
-  OneBox(const float (&l)[3], const float (&h)[3], float room) {
-    for (int k = 0; k < 3; ++k) low[k] = l[k] - room, high[k] = h[k] + room;
+  OneBox(const float (&l)[3], const float (&h)[3], float margin) {
+    for (int k = 0; k < 3; ++k) low[k] = l[k] - margin, high[k] = h[k] + margin;
   }
-  OneBox(const float (&l)[3][kWidth], const float (&h)[3][kWidth], std::uint32_t lane, float room) {
-    for (int k = 0; k < 3; ++k) low[k] = l[k][lane] - room, high[k] = h[k][lane] + room;
+  OneBox(const float (&l)[3][kWidth], const float (&h)[3][kWidth], std::uint32_t lane,
+         float margin) {
+    for (int k = 0; k < 3; ++k) low[k] = l[k][lane] - margin, high[k] = h[k][lane] + margin;
   }
 };
 

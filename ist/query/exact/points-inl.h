@@ -1,5 +1,5 @@
 // Points whose coordinates are lanes of doubles. Included once per target. exact::Point has single
-// doubles, since functions for one target's instructions are not called from outside it.
+// doubles, since functions compiled for one target are not called from outside it.
 
 #if defined(IST_QUERY_POINTS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_POINTS_INL_H_

@@ -16,7 +16,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Finds how surfaces touch.
 class ContactSearch : PairSigns {
  public:
   ContactSearch(const CrossingSearch& search, ExactScratch& scratch)

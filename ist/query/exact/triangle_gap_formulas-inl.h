@@ -3,7 +3,7 @@
 // those of careful_cross-inl.h and edge_gap_formulas-inl.h before.
 
 /// A triangle with the data for its nearest points. A careful product keeps the digits of its
-/// normal however thin it is: it is the normal of a triangle whose corners differ by rounding.
+/// normal however thin it is: the normal belongs to a triangle whose corners differ by rounding.
 struct Flat {
   Vec3 corner[3], side[3];
   Real inverse[3];  ///< of squared sides; 0 if a side has no length

@@ -18,11 +18,11 @@ namespace ist::HWY_NAMESPACE {
 /// Finds the triangles of two blocks that may be within a limit, in float with an error of `blur`.
 class TriangleCulls {
  public:
-  TriangleCulls(const PlacedTriangles& a, const PlacedTriangles& b, const WayAxes& axes, float blur)
+  TriangleCulls(const PlacedTriangles& a, const PlacedTriangles& b, const GapAxes& axes, float blur)
       : a_(a), b_(b), blur_(blur) {
     for (std::size_t k = 0; k < 3; ++k) {
-      of_a_[k] = along(axes.way[k], a);
-      of_b_[k] = along(axes.way[k], b);
+      of_a_[k] = along(axes.axis[k], a);
+      of_b_[k] = along(axes.axis[k], b);
       low_b_[k] = lowest(of_b_[k].low) - blur;
       high_b_[k] = highest(of_b_[k].high) + blur;
     }
@@ -58,7 +58,7 @@ class TriangleCulls {
       low[k] = of_a_[k].low[i] - blur_, high[k] = of_a_[k].high[i] + blur_;
     std::uint32_t bits = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      // A lane's result must not depend on the lanes beside it, whose number depends on the
+      // A lane's result must not depend on the lanes beside it, since their number depends on the
       // processor.
       V squared = less * apart(of_b_, low, high, l);
       const auto is_far = squared > far_squared;
@@ -149,7 +149,7 @@ class TriangleCulls {
         }
         const V squared = (out[0] * out[0] + out[1] * out[1]) + out[2] * out[2],
                 side_squared = (side[0] * side[0] + side[1] * side[1]) + side[2] * side[2];
-        // Slivers, whose normals have no digits, decide nothing.
+        // Slivers, whose normals have no valid digits, decide nothing.
         const V inverse =
             hn::IfThenElseZero(squared > hn::Set(d, 0.9f) * side_squared,
                                inverse_of_length(hn::Sqrt(squared) * hn::Set(d, kLonger)));
@@ -208,10 +208,10 @@ class TriangleCulls {
 };
 
 /// The gap between the vertices of a block of A and those of one of B, along a direction.
-inline double gap_along(const exact::Point& way, const PlacedVertices& of_a,
+inline double gap_along(const exact::Point& direction, const PlacedVertices& of_a,
                         const PlacedVertices& of_b) {
   const D d;
-  const V x = hn::Set(d, way.x), y = hn::Set(d, way.y), z = hn::Set(d, way.z);
+  const V x = hn::Set(d, direction.x), y = hn::Set(d, direction.y), z = hn::Set(d, direction.z);
   const auto along = [&](const PlacedVertices& of, std::size_t l) {
     return (x * hn::Load(d, of.at[0] + l) + y * hn::Load(d, of.at[1] + l)) +
            z * hn::Load(d, of.at[2] + l);
@@ -232,7 +232,7 @@ struct PlacedBox {
 
 /// A node's box in A's unit frame; `map` is null for A's own.
 inline PlacedBox placed_box(const MeshTree& mesh, int level, std::uint32_t number,
-                            const Similarity* map, const WayAxes& axes) {
+                            const Similarity* map, const GapAxes& axes) {
   const MiddleBox<double> box = box_of<double>(mesh, level, number);
   PlacedBox out;
   out.middle = {box.middle[0], box.middle[1], box.middle[2]};
@@ -241,11 +241,11 @@ inline PlacedBox placed_box(const MeshTree& mesh, int level, std::uint32_t numbe
     for (int i = 0; i < 3; ++i)
       out.side[k][i] = box.half[k] * (map == nullptr ? i == k : map->m[3 * i + k]);
   for (std::size_t j = 0; j < 3; ++j) {
-    const exact::Point& way = axes.way[j];
+    const exact::Point& axis = axes.axis[j];
     double reach = 0;
-    for (const exact::Point& side : out.side) reach += std::abs(dot(way, side));
-    out.low[j] = dot(way, out.middle) - reach;
-    out.high[j] = dot(way, out.middle) + reach;
+    for (const exact::Point& side : out.side) reach += std::abs(dot(axis, side));
+    out.low[j] = dot(axis, out.middle) - reach;
+    out.high[j] = dot(axis, out.middle) + reach;
   }
   return out;
 }
@@ -253,12 +253,12 @@ inline PlacedBox placed_box(const MeshTree& mesh, int level, std::uint32_t numbe
 /// The extents of a block's triangles along three axes, in double.
 class BlockExtents {
  public:
-  BlockExtents(const PlacedVertices& vertices, const MeshBlock& block, const WayAxes& axes) {
+  BlockExtents(const PlacedVertices& vertices, const MeshBlock& block, const GapAxes& axes) {
     for (std::size_t k = 0; k < 3; ++k) {
       double along[kWidth];
       for (std::size_t v = 0; v < kWidth; ++v)
-        along[v] = (axes.way[k].x * vertices.at[0][v] + axes.way[k].y * vertices.at[1][v]) +
-                   axes.way[k].z * vertices.at[2][v];
+        along[v] = (axes.axis[k].x * vertices.at[0][v] + axes.axis[k].y * vertices.at[1][v]) +
+                   axes.axis[k].z * vertices.at[2][v];
       for (std::size_t t = 0; t < kWidth; ++t) {
         const double p = along[block.corner[0][t]], q = along[block.corner[1][t]],
                      r = along[block.corner[2][t]];
@@ -309,10 +309,10 @@ class BlockExtents {
   alignas(64) double low_[3][kWidth], high_[3][kWidth];
 };
 
-/// The triangles of a block that is much larger than what they are measured from.
+/// The triangles of a block that is much larger than the other node.
 class BlockFaces : public BlockExtents {
  public:
-  BlockFaces(const PlacedVertices& vertices, const MeshBlock& block, const WayAxes& axes)
+  BlockFaces(const PlacedVertices& vertices, const MeshBlock& block, const GapAxes& axes)
       : BlockExtents(vertices, block, axes) {
     const D d;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
@@ -347,18 +347,18 @@ class BlockFaces : public BlockExtents {
   }
 
   /// The vector from the nearest triangle to a point, of any length.
-  exact::Point way_to(const exact::Point& point) const {
+  exact::Point vector_to(const exact::Point& point) const {
     const D d;
-    alignas(64) double squared[kWidth], way[3][kWidth];
+    alignas(64) double squared[kWidth], between[3][kWidth];
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
       const NearestPoints nearest = nearest_to(point, l);
       hn::Store(nearest.squared, d, squared + l);
-      hn::Store(nearest.between.x, d, way[0] + l);
-      hn::Store(nearest.between.y, d, way[1] + l);
-      hn::Store(nearest.between.z, d, way[2] + l);
+      hn::Store(nearest.between.x, d, between[0] + l);
+      hn::Store(nearest.between.y, d, between[1] + l);
+      hn::Store(nearest.between.z, d, between[2] + l);
     }
     const auto least = std::min_element(squared, squared + kWidth) - squared;
-    return {way[0][least], way[1][least], way[2][least]};
+    return {between[0][least], between[1][least], between[2][least]};
   }
 
  private:
@@ -435,15 +435,15 @@ inline Corners corners(const TrianglePairs& pairs, int side, std::uint32_t n) {
 }
 
 /// True if the triangles of pair n cross. They do not if a plane perpendicular to the direction
-/// between the found points separates them. It does if these are the nearest points, except for
+/// between the found points separates them, which it does for the nearest points, except for
 /// rounding.
 inline bool crosses(const TrianglePairs& pairs, const PairGaps& gaps, std::uint32_t n,
                     double slack) {
-  const exact::Point way = {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]};
+  const exact::Point between = {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]};
   const auto [a] = corners(pairs, 0, n);
   const auto [b] = corners(pairs, 1, n);
-  const double last = std::max({dot(way, a[0]), dot(way, a[1]), dot(way, a[2])}),
-               next = std::min({dot(way, b[0]), dot(way, b[1]), dot(way, b[2])});
+  const double last = std::max({dot(between, a[0]), dot(between, a[1]), dot(between, a[2])}),
+               next = std::min({dot(between, b[0]), dot(between, b[1]), dot(between, b[2])});
   return !(next - last > 4 * slack * std::sqrt(gaps.squared[n])) && exact::cross_exactly(a, b);
 }
 

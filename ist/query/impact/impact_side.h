@@ -71,7 +71,6 @@ struct NearestPoints {
 };
 NearestPoints nearest_points(const ConvexPiece& a, const ConvexPiece& b) noexcept;
 
-/// The point of a piece that is nearest to x.
 Eigen::Vector3d nearest_in_piece(const ConvexPiece& piece, const Eigen::Vector3d& x) noexcept;
 
 /// True if an edge of one triangle passes through the other.
@@ -98,7 +97,6 @@ class GjkDistance {
   Eigen::Vector3d shortest_ = Eigen::Vector3d::Zero(), point_ = Eigen::Vector3d::Zero();
 };
 
-/// The point of a hull that is furthest along a direction.
 Eigen::Vector3d furthest(const PointHull& hull, const Eigen::Vector3d& n) noexcept;
 
 /// A plane between two hulls, which are `apart` along its normal if that is positive.
@@ -108,7 +106,7 @@ struct HullPlane {
 };
 
 /// Searches for a plane that shows most of the distance, from a guess of the direction from A to B.
-/// Finds none if they are no further apart than `least`.
+/// Finds none if the hulls are no further apart than `least`.
 HullPlane plane_between(const PointHull& a, const PointHull& b, const Eigen::Vector3d& guess,
                         double least) noexcept;
 

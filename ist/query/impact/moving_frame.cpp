@@ -115,7 +115,7 @@ Placement place(const MovingFrame& frame, double time) noexcept {
   at.b = frame.b.unit * frame.b.turning.at(time).toRotationMatrix();
   at.between = frame.between + frame.velocity * time;
   const double path = frame.between.norm() + frame.speed * time;
-  // B's coordinates may be rotated into A's frame too.
+  // B's coordinates may be rotated into A's frame.
   const double around_a = frame.a.reach + at.between.norm() + frame.b.reach;
   at.error = kPathRounding * path + kTurnRounding * (around_a * (1 + frame.a.spin_speed * time) +
                                                      frame.b.reach * frame.b.spin_speed * time);

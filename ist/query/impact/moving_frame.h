@@ -33,8 +33,8 @@ class Turning {
   double turns_ = 0;  ///< a unit of time
 };
 
-/// One body of a pair. x, of its unit frame, is at R(t) · unit · (x − centre) from the point of the
-/// body that moves straight.
+/// One body of a pair. A point x of its unit frame is at R(t) · unit · (x − centre) from the point
+/// of the body that moves straight.
 struct MovingBody {
   Turning turning;
   Eigen::Vector3d spin = Eigen::Vector3d::Zero();  ///< angular velocity, world
@@ -61,7 +61,6 @@ struct MovingFrame {
   }
 };
 
-/// Both bodies at a time.
 struct Placement {
   double time = -1;
   Eigen::Matrix3d a, b;     ///< unit · R
@@ -80,14 +79,14 @@ std::optional<MovingFrame> moving_frame(const PlacedAsset& a, const PlacedAsset&
 std::optional<MovingFrame> moving_frame(const PlacedShape& a, const PlacedAsset& b,
                                         const Motions& motions, double duration) noexcept;
 
-/// The time for which a gap lasts that shrinks at `rate`, a speed that grows by at most `bend`.
+/// The time for which a gap lasts if it shrinks at `rate`, a speed that grows by at most `bend`.
 double safe_step(double gap, double rate, double bend) noexcept;
 
 // Pairs of balls further apart than this fraction of the larger radius are advanced, others opened.
 inline constexpr double kFarApart = 0.05;
 
-// An impact is reported once the gap is this fraction of the tolerance. Steps end at a half of it,
-// so that none is too short to advance.
+// An impact is reported once the gap is this fraction of the tolerance. Steps end at half the
+// tolerance, so that none is too short to advance.
 inline constexpr double kReported = 0.75;
 
 /// The outcome of a pair, in the frame's unit of length.
@@ -100,9 +99,9 @@ struct ImpactFound {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
 };
 
-/// Conservative advancement of pairs of nodes, each of which is known to be clear up to a time of
-/// its own. The earliest is visited next, so all are clear up to that time. A pair that stays clear
-/// to the end is dropped.
+/// Conservative advancement of pairs of nodes. Each is known to be clear up to its own time. The
+/// earliest is visited next, so all are clear up to that time. A pair that stays clear to the end
+/// is dropped.
 class ImpactLoop {
  public:
   ImpactLoop(const MovingFrame& frame, double tolerance, const ImpactSettings& settings,

@@ -36,7 +36,7 @@ TurningPoint turning_point(const MovingBody& body, const Eigen::Matrix3d& turned
 /// The time for which two convex parts with a gap along the unit vector n, A to B, stay clear.
 ///
 /// `turning`: their approach along n now, by rotation alone; speed_a, speed_b: bounds on the speeds
-/// of their points by rotation. Of balls only the centres count, since balls do not change by
+/// of their points by rotation. Only the centres of balls count, since balls do not change by
 /// rotation.
 double clear_step(const MovingFrame& frame, const Eigen::Vector3d& n, double gap, double turning,
                   double speed_a, double speed_b) noexcept;

@@ -7,7 +7,7 @@
 
 namespace ist {
 
-/// Two trees of which x is opened.
+/// Two trees; x is opened.
 struct GapSide {
   GapSide(const SphereTree& x_tree, const SphereTree& y_tree, const Similarity& map,
           Precision digits)
@@ -43,7 +43,7 @@ struct LeafGap {
   std::uint32_t lane_x, lane_y;  ///< of the least gap; the lowest among equals
 };
 
-/// Skips spheres of x whose gaps to y's leaf ball are below neither limit.
+/// Skips spheres of x whose gap to y's leaf ball is not below either limit.
 LeafGap leaf_gap(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
                  double gap_limit, double cover_limit) noexcept;
 

@@ -24,7 +24,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 template <class T>
 using LaneTag = hn::CappedTag<T, kWidth>;
 
-/// Loads floats as T.
 template <class T, class D = LaneTag<T>>
 HWY_INLINE hn::Vec<D> load_as(D d, const float* from) {
   if constexpr (sizeof(T) == sizeof(float)) {
@@ -34,7 +33,6 @@ HWY_INLINE hn::Vec<D> load_as(D d, const float* from) {
   }
 }
 
-/// Stores doubles as T.
 template <class T, class D>
 HWY_INLINE void store_as(hn::Vec<D> v, D d, T* to) {
   if constexpr (sizeof(T) == sizeof(float)) {

@@ -145,8 +145,8 @@ static_assert(1u << kWidthBits == kWidth);
 inline constexpr std::size_t kTaskCapacity = kPairsAtOnce * kWidth;
 
 /// Pairs of leaf blocks that go through the stages together. The sixteen spheres of the larger
-/// block are sixteen tasks, since fewer of these reach the other's leaf ball: each is tested
-/// against the sixteen spheres of the other block. Task 16 i + l is lane l of pair i.
+/// block are sixteen tasks, since fewer of them reach the other's leaf ball: each is tested against
+/// the sixteen spheres of the other block. Task 16 i + l is lane l of pair i.
 template <class T>
 struct alignas(64) PairsOfBlocks {
   T x[kTaskCapacity], y[kTaskCapacity], z[kTaskCapacity];  ///< from the other block's origin

@@ -107,7 +107,7 @@ HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
       auto near = near_of(block, lane, fixed, i, d2, r);
       const std::uint32_t child = first_child + static_cast<std::uint32_t>(lane);
       if constexpr (kContained) {
-        // Only of near lanes: the square of an unused one may overflow.
+        // Computed for near lanes only: the square of an unused one may overflow.
         const auto spare =
             hn::IfThenElseZero(near, hn::Max(hn::Set(d, fixed.within[i]) - r, hn::Zero(d)));
         const auto inside = d2 < spare * spare;

@@ -9,8 +9,8 @@
 
 namespace ist {
 
-/// A coarse estimate of the overlap of two trees, each a few balls that are evenly filled with the
-/// volume of the spheres below. Smooth in the pose. A's unit frame.
+/// A coarse estimate of the overlap of two trees, each approximated by a few balls that are evenly
+/// filled with the volume of the spheres below. Smooth in the pose. A's unit frame.
 struct QuickLook {
   double volume = 0;
   PoseSlope slope;

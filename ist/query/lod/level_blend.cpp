@@ -27,7 +27,7 @@ struct LevelQueries {
   const AssetHeader& a = placed_a.asset.header();
   const AssetHeader& b = placed_b.asset.header();
   const bool same_asset = are_one_asset(a, b);
-  /// The exact measure may answer: nothing limits sphere pairs, a limit that it does not obey.
+  /// The exact measure may answer if sphere pairs are not limited, a limit that it does not obey.
   const bool has_exact =
       by_error(settings) && settings.pair_budget == 0 && a.mesh != 0 && b.mesh != 0;
   std::uint32_t visits = 0, pairs = 0;
@@ -42,8 +42,8 @@ struct LevelQueries {
     return counted(sum(pair, limits));
   }
 
-  /// The sum of a pair of levels; for copies of one asset that nearly coincide that of unlike
-  /// levels, unless the exact measure answers there. `most`: its weight is the largest.
+  /// The sum of a pair of levels. For copies of one asset that nearly coincide, it is that of
+  /// unlike levels, unless the exact measure answers there. `most`: its weight is the largest.
   Penetration ask(const LevelPair& pair, bool most, bool keep_rounding = false) noexcept {
     const CoincidenceWeight coincidence = coincidence_weight_of(pair);
     if (coincidence.weight == 0 || has_exact) return descend(pair, most, keep_rounding);
@@ -86,7 +86,6 @@ struct LevelQueries {
     return coincidence_weight(tree.root, tree.mean_radius, pose.a_from_b);
   }
 
-  /// The answer with the counts of all queries.
   Penetration with_counts(Penetration answer) const noexcept {
     answer.node_visits = visits;
     answer.sphere_pairs = pairs;
@@ -172,7 +171,6 @@ Penetration stopped_blend(LevelQueries& queries, const LevelChain& chain,
   return result;
 }
 
-/// The shares of levels and measures in a blend.
 struct BlendShares {
   WantedError::Shares wanted;        ///< by errors; none of the exact measure if it can't answer
   LevelChain::Weights weights = {};  ///< of levels, as far as the pair budget affords `wanted`
@@ -221,8 +219,8 @@ struct BlendSum {
   Penetration sum = {};
   bool by_levels = false;         ///< a part of the sum is
   double largest = 0;             ///< weight of the largest level
-  Penetration exact_weight = {};  ///< as if it were a volume, with its gradients except those by …
-  double exact_slope = 0;         ///< … the coarse estimate
+  Penetration exact_weight = {};  ///< as if it were a volume; without its gradients by
+  double exact_slope = 0;         ///< the coarse estimate
   double slope = 0;               ///< of the sum by the coarse estimate
   double sure_slope = 0;          ///< of the sum by the quick look
   // Rounding of the sum, and of the exact measure's weight, which depends on volumes:
@@ -337,7 +335,6 @@ Penetration blend_levels(const PlacedAsset& a, const PlacedAsset& b, const Relat
   const bool with_error = by_error(settings);
   if (!with_error && settings.pair_budget == 0) return queries.ask(LevelPair(), true);
   const LevelChain chain(a.asset.header(), b.asset.header(), pose.a_from_b.scale);
-  // There is one level.
   if (!with_error && chain.size() == 1) return queries.ask(chain[0], true);
   LevelWeight sure = {};
   if (!with_error) {

@@ -70,8 +70,8 @@ inline bool asks_levels(const PlacedAsset& a, const PlacedAsset& b,
 /// The penetration by levels of detail. Under a wanted error levels and the exact measure are
 /// blended by their errors (WantedError), under a pair budget levels by their costs (LevelChain);
 /// without either the finest answers. Copies of one asset that nearly coincide use unlike levels
-/// (CoincidenceWeight). The gradients are those of the blended sum. `largest`: null if that part is
-/// summed as the others. No allocation, lock or exception.
+/// (CoincidenceWeight). The gradients are those of the blended sum. `largest`, unless null, sums
+/// the part of the largest weight. No allocation, lock or exception.
 Penetration blend_levels(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
                          const PenetrationSettings& settings, Workspace& workspace,
                          ExactMeasure exact, LargestPart* largest = nullptr) noexcept;

@@ -47,7 +47,7 @@ class WantedError {
 
   struct Shares {
     LevelChain::Weights levels = {};  ///< of the chain
-    LevelWeight rest{1, 0};           ///< of no level
+    LevelWeight rest{1, 0};           ///< left to no level
   };
   /// Weights, which sum to 1. The coarsest pair gets all from the overlap on at which it is
   /// accurate enough, and nothing up to 0.7 of that; the rest goes to the next finer pair by the

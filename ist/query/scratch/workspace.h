@@ -16,7 +16,6 @@
 
 namespace ist {
 
-/// A pair of nodes with the bound by which it is ranked.
 struct RankedPair {
   double bound;
   std::uint32_t a, b;
@@ -24,7 +23,7 @@ struct RankedPair {
 
 /// A pair of nodes that waits to be opened.
 struct WaitingPair {
-  double gap;    ///< lower bound on the gap of spheres below, but for rounding
+  double gap;    ///< lower bound on the gap of spheres below, up to rounding
   double cover;  ///< the same for cover balls
   std::uint32_t a, b;
   std::int32_t level_a, level_b;
@@ -79,7 +78,7 @@ class GapStack {
   }
 
   /// Calls open(pair) while pairs are wanted and done() is false. Returns true if the limit of
-  /// visits stopped it; the pairs that wait bound the gap of covers then.
+  /// visits stopped it; then the pending pairs bound the gap of covers.
   template <class Open, class Done>
   bool search(const WaitingPair& root, const Open& open, const Done& done) noexcept {
     add(root);

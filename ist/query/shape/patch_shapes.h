@@ -18,7 +18,7 @@ namespace ist {
 
 /// Sums over the parts of balls inside a shape, relative to the probing tree's unit-frame origin.
 struct ProbeTotal {
-  Overlap overlap;     ///< its error is left to the descent
+  Overlap overlap;     ///< without the error, which the descent adds
   double area = 0;     ///< of the shape's surface inside the balls
   double crossed = 0;  ///< volume of the balls that the surface crosses
 
@@ -29,7 +29,7 @@ struct ProbeTotal {
   }
 };
 
-/// Adds a ball's part. `x`: the centre, which `gradient` and `moment` are by and about.
+/// Adds a ball's part. `x`: the centre; `gradient` is by its motion, `moment` about it.
 inline void add_part(const Eigen::Vector3d& x, double volume, const Eigen::Vector3d& gradient,
                      const Eigen::Vector3d& moment, Overlap& sum) noexcept {
   sum.volume += volume;

@@ -22,7 +22,7 @@ bool opens_a(const SphereTree& a, int level_a, const SphereTree& b, int level_b,
 /// The staged traversal of docs/design.md 7: node pairs level by level, then pairs of leaf blocks.
 class Descent {
  public:
-  /// All arguments must outlive the traversal. `bins`: get the sums too.
+  /// All arguments must outlive the traversal. `bins`, unless null, get the sums too.
   Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
           const DescentLimits& limits, Workspace::Impl& scratch, ContactBins* bins = nullptr);
 
@@ -54,14 +54,12 @@ class Descent {
 
   void open_leaves();
 
-  /// Sums pairs [from, from + n) of the current list.
   void add_leaves(std::size_t from, std::size_t n);
 
   /// If the current list is longer than the visits left, moves the pairs of the largest bounds to
   /// its front. Both parts stay in order, since neighbours share nodes.
   void choose();
 
-  /// Estimates the pairs of a list from `from` on.
   void estimate_unopened(const PairList& list, std::size_t from);
 
   const SphereTree& a_;

@@ -8,7 +8,6 @@
 
 namespace ist {
 
-/// A pair of nodes.
 struct NodePair {
   std::uint32_t a, b;
   int level_a, level_b;

@@ -27,11 +27,11 @@ double volume_of(double radius, double length) {
 
 double volume_of(const CoverCapsule& c) { return volume_of(c.radius, (c.end - c.begin).norm()); }
 
-/// A line through the solid's middle, and how much wider than needed the capsule around it is.
+/// A line through the solid's middle, and the excess width of the capsule around it:
 using Axis = std::array<double, 5>;  ///< turns of the start axis about two others, offsets along
                                      ///< these, share by which the radius grows
 
-/// The shortest capsule of that axis that contains all points.
+/// The shortest capsule with that axis that contains all points.
 class Fit {
  public:
   Fit(std::span<const Vector3d> points, const Vector3d& middle, double size,
@@ -68,8 +68,9 @@ class Fit {
   const Eigen::Matrix3d start_;
 };
 
-/// Steps along each number as long as that helps by a share `gain`, then shorter ones. Around a
-/// flat layer ever smaller steps towards infinity would help for ever: their number is bounded.
+/// Steps along each number as long as that improves by a share `gain`, then takes shorter steps.
+/// Around a flat layer ever smaller steps towards infinity would always improve, so their number is
+/// limited.
 Axis improved(const Fit& fit, double finest, double gain) {
   constexpr int kMostRounds = 24;
   Axis best = {0, 0, 0, 0, 0};
@@ -122,8 +123,8 @@ CoverCapsule capsule_around(std::span<const Vector3d> points, bool rough = false
       best = found;
       least = volume;
     }
-  // A capsule is convex: it contains what lies between the points if it contains these. What
-  // rounding may hide is a millionth part of the margin.
+  // A capsule is convex: if it contains the points, it contains everything between them. The margin
+  // exceeds rounding by a factor of a million.
   double most = 0;
   const Vector3d along = best.end - best.begin;
   for (const Vector3d& p : points) {
@@ -141,7 +142,7 @@ constexpr std::size_t kLayers = 12;
 /// Points of each layer between equidistant planes across a direction: corners of triangles in it,
 /// and intersections of triangles' sides with planes. The solid's part in a layer lies within the
 /// hull of these points: its boundary consists of parts of triangles and of flat cuts, whose
-/// borders lie in triangles too.
+/// borders are in triangles too.
 using Layers = std::array<std::vector<Vector3d>, kLayers>;
 
 Layers layers_across(const ClosedMesh& mesh, const Vector3d& along) {
@@ -181,7 +182,7 @@ Layers layers_across(const ClosedMesh& mesh, const Vector3d& along) {
   return layers;
 }
 
-/// Those furthest in some of many directions: a capsule around them is hardly smaller than one
+/// The points furthest in some of many directions: a capsule around them is hardly smaller than one
 /// around all.
 std::vector<Vector3d> outermost(const std::vector<Vector3d>& points) {
   constexpr int kDirections = 80;
@@ -210,7 +211,7 @@ std::vector<Vector3d> joined(const Layers& layers, std::size_t first, std::size_
   return points;
 }
 
-/// Where layers are divided, for the least sum of volumes.
+/// The division of layers with the least sum of volumes.
 struct Division {
   std::vector<std::size_t> ends;  ///< the layers after each part
   double volume = std::numeric_limits<double>::infinity();

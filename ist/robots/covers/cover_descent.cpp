@@ -25,7 +25,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A place of the surface outside all balls.
+/// A place on the surface outside all balls.
 struct OpenCorner {
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< unit frame
   double gap = 0;                                   ///< unit frame, > 0: to the nearest ball
@@ -50,7 +50,7 @@ class Cutter {
         touching_.push_back(i);
   }
 
-  /// `holder`: tried first, and set to what contains the triangle whole.
+  /// `holder`: tried first, and set to the ball that contains the whole triangle.
   void cut(const Corners& triangle, std::uint32_t& holder, std::vector<OpenCorner>& out) {
     if (holder < balls_.size() && holds(balls_[holder], triangle)) return;
     const Vector3d middle = (triangle[0] + triangle[1] + triangle[2]) / 3;
@@ -83,7 +83,7 @@ class Cutter {
   }
 
  private:
-  /// Clips the piece to the ball's cell; false if nothing is left, or the ball contains it.
+  /// Clips the piece to the ball's cell; false if nothing is left, or if the ball contains it.
   bool cut_to_cell(std::uint32_t i) {
     const CoverSphere& own = balls_[i];
     const double own_power = own.centre.squaredNorm() - own.radius * own.radius;
@@ -120,16 +120,16 @@ class Cutter {
   Polygon piece_, clipped_;
 };
 
-/// Places of the surface outside the balls, unit frame; none where it is contained, but for
-/// rounding: this is for a search, open_surface() proves. Others may be further outside, between
-/// balls of unlike radii by a few times as far.
+/// Places of the surface outside the balls, unit frame; none if it is covered up to rounding: this
+/// is for a search, open_surface() proves. Other places may be further outside, between balls of
+/// different radii a few times as far.
 ///
-/// The balls' power diagram cuts each triangle into convex pieces, and of a piece the ball of its
-/// cell is that to which its points are nearest, by power. So the ball contains the piece if it
-/// contains its corners, and if it does not, no ball contains that corner.
+/// The balls' power diagram cuts each triangle into convex pieces; the points of a piece are
+/// nearest, by power, to the ball of its cell. So the ball contains the piece if it contains its
+/// corners, and if it does not contain a corner, no ball does.
 ///
-/// `holders`: of each triangle a ball that may contain it whole, from an earlier call with balls
-/// that have moved little, or nothing; it takes those of this one.
+/// `holders`: for each triangle a ball that may contain all of it, from an earlier call with balls
+/// that have moved little, or empty; updated by this call.
 std::vector<OpenCorner> open_corners(const MeshView& mesh, std::span<const CoverSphere> balls,
                                      std::vector<std::uint32_t>& holders) {
   holders.resize(mesh.triangle_count, UINT32_MAX);
@@ -150,7 +150,8 @@ std::vector<OpenCorner> open_corners(const MeshView& mesh, std::span<const Cover
   return out;
 }
 
-/// A ball's centre, and by how much its farthest point is further than its nearest wall.
+/// A ball's centre, and the excess of the distance to its farthest point over that to its nearest
+/// wall.
 struct Recentred {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double excess = 0;
@@ -168,7 +169,7 @@ Look look(const Vector3d& c, std::span<const Vector3d> points, std::span<const V
   return {std::sqrt(far2), walls.empty() ? 0 : std::sqrt(near2)};
 }
 
-/// Directions from what nearly counts to the centre.
+/// Directions to the centre from the points that are nearly extreme.
 struct Slopes {
   std::vector<Vector3d> up, down;
 
@@ -207,10 +208,10 @@ struct Slopes {
   }
 };
 
-/// Moves a centre, by at most `trust`, so that the farthest of `points` is as little beyond the
-/// nearest of `walls` as can be: steepest descent of max |p − c| − min |w − c|, along the shortest
-/// vector of the hull of all slopes that nearly count. `points` must not be empty; walls missing
-/// from the list must be no nearer than any of it, wherever the centre may go.
+/// Moves a centre, by at most `trust`, to minimise the excess of the farthest of `points` over the
+/// nearest of `walls`: steepest descent of max |p − c| − min |w − c|, along the shortest vector of
+/// the hull of all nearly active slopes. `points` must not be empty; walls missing from the list
+/// must be no nearer than any listed one, wherever the centre may move.
 Recentred recentre(const Vector3d& start, std::span<const Vector3d> points,
                    std::span<const Vector3d> walls, double trust) {
   Vector3d c = start;
@@ -245,15 +246,15 @@ Recentred recentre(const Vector3d& start, std::span<const Vector3d> points,
 
 constexpr double kFirstStep = 0.08;  ///< by which the level is lowered at a time
 constexpr double kLastStep = 0.003;
-constexpr double kHeld = 0.002;       ///< of the level: a gap so small is none
-constexpr double kBeyond = 1.005;     ///< of the level: what reaches no further needs no ray
-constexpr double kWorthwhile = 0.01;  ///< by which a level has to fall before rays are looked at
-constexpr int kPatience = 3;          ///< looks at a level without gain
-constexpr double kVouched = 0.9;  ///< of a level: further down what was seen there is not believed
+constexpr double kHeld = 0.002;       ///< of the level: smaller gaps are ignored
+constexpr double kBeyond = 1.005;     ///< of the level: balls that reach no further need no ray
+constexpr double kWorthwhile = 0.01;  ///< by which a level must fall before rays are examined
+constexpr int kPatience = 3;          ///< examinations of a level without gain
+constexpr double kVouched = 0.9;      ///< of a level: results are not trusted below it
 constexpr int kRoundsALook = 3;
-constexpr double kApart = 0.05;  ///< levels between targets that a look adds
+constexpr double kApart = 0.05;  ///< levels between targets that one examination adds
 
-/// A ball of radius 0 has its centre too far out to be one, and stays none.
+/// A ball of radius 0 has its centre too far out, and stays empty.
 std::vector<CoverSphere> grown(std::vector<CoverSphere> balls, double by) {
   for (CoverSphere& ball : balls)
     if (ball.radius > 0) ball.radius += by;
@@ -262,7 +263,7 @@ std::vector<CoverSphere> grown(std::vector<CoverSphere> balls, double by) {
 
 }  // namespace
 
-/// The places of the balls, and how far each may go at a time.
+/// The places of the balls, and how far each may move at a time.
 struct CoverDescent::Balls {
   Balls(const OffsetSurface& surface, std::vector<Vector3d> at)
       : centres(std::move(at)), trust(centres.size(), 0.5 * surface.level()) {
@@ -284,7 +285,6 @@ struct CoverDescent::Balls {
   std::vector<double> radii, trust;
 };
 
-/// All balls at the level of the surface.
 class CoverDescent::Round {
  public:
   Round(const PointGrid& targets, const OffsetSurface& surface, Balls& balls)
@@ -300,7 +300,7 @@ class CoverDescent::Round {
       if (holders_[x] == 0) open_.push_back(x);
   }
 
-  /// Returns whether a ball moved.
+  /// Returns true if a ball moved.
   bool move_all() {
     bool moved = false;
     for (std::size_t i = 0; i < balls_.centres.size(); ++i) moved |= may_help(i) && move(i);
@@ -308,7 +308,7 @@ class CoverDescent::Round {
   }
 
  private:
-  /// Whether an open target is within reach of the ball.
+  /// True if an open target is within reach of the ball.
   bool may_help(std::size_t i) {
     std::erase_if(open_, [&](std::uint32_t x) { return holders_[x] != 0; });
     const double reach = balls_.radii[i] + reach_;
@@ -345,20 +345,21 @@ class CoverDescent::Round {
     return true;
   }
 
-  /// Levels beyond its surface a ball looks at. Where it looks further, it lets go of what it
-  /// contains, for a target that it will not reach, and gaps grow.
+  /// Levels beyond its surface up to which a ball considers targets. Further away, it would give up
+  /// what it contains for a target that it cannot reach, and gaps would grow.
   static constexpr double kReach = 0.3;
 
   const PointGrid& targets_;
   const OffsetSurface& surface_;
   const double reach_;
   Balls& balls_;
-  std::vector<int> holders_;         ///< balls that contain a target
-  std::vector<std::uint32_t> open_;  ///< targets that none contains, and some that one does by now
+  std::vector<int> holders_;  ///< balls that contain a target
+  std::vector<std::uint32_t>
+      open_;  ///< targets that no ball contained; some may be contained by now
   std::vector<Vector3d> needed_, walls_;
 };
 
-/// Returns how far the worst place that was found is outside.
+/// Returns the distance of the worst place found outside.
 double CoverDescent::add_targets(const std::vector<CoverSphere>& balls, double level) {
   std::vector<OpenCorner> open = open_corners(solid_.arrays(), balls, holders_);
   if (sampled_.share)
@@ -374,19 +375,19 @@ double CoverDescent::add_targets(const std::vector<CoverSphere>& balls, double l
   return open.empty() ? 0 : open.front().gap;
 }
 
-/// Returns by how much the worst ball reaches too far.
+/// Returns the excess reach of the worst ball.
 double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<CoverSphere>& balls) {
   const double level = surface.level();
   std::vector<std::vector<Vector3d>> beyond(balls.size());
   std::vector<double> further(balls.size(), 0);
   vouched_.resize(balls.size(), {Vector3d::Zero(), 0});
   tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t i) {
-    // A place that was examined before needs no second look.
+    // A place that was examined before is skipped.
     CoverSphere& vouched = vouched_[i];
     if (vouched.centre == balls[i].centre && level <= vouched.radius &&
         level > kVouched * vouched.radius)
       return;
-    // Nor does what the distance alone vouches for.
+    // So is one that the distance alone proves.
     if (balls[i].radius <= surface.sure_radius(balls[i].centre) * (1 + 1e-9)) return;
     further[i] =
         guessed_protrusion(solid_, balls[i], 0.05, kBeyond * level, beyond[i]).least - level;
@@ -408,7 +409,7 @@ double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<Co
   return std::max(0.0, *std::max_element(further.begin(), further.end()));
 }
 
-/// Returns how deep the place lies that was found, 0 if none was.
+/// Returns the depth of the place found, 0 if none was.
 double CoverDescent::add_void(const std::vector<CoverSphere>& balls, double level) {
   const OpenPlace open = open_void(solid_, balls);
   if (!open.found || open.gap <= kHeld * level) return 0;
@@ -423,7 +424,7 @@ LookedCover CoverDescent::improve(LevelCover start, int rounds, const std::funct
   for (double step = 0; rounds > 0 && (step == 0 || step > kLastStep);) {
     const bool first = step == 0;
     const double aim = cover.level * (1 - step);
-    // At the aim, not at the level that was reached: rays that end between the two are walls here.
+    // Uses the target level, not the level reached: rays that end between the two are walls here.
     OffsetSurface surface(solid_, sampled_, aim);
     Balls balls(surface, cover.centres);
     double best_here = std::numeric_limits<double>::infinity();

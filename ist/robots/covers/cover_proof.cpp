@@ -22,8 +22,7 @@ using BallList = std::vector<std::uint32_t>;
 
 double distance(const Vector3d& a, const Vector3d& b) { return std::sqrt((a - b).squaredNorm()); }
 
-/// Calls `take(part)` for every open part until it returns false; meanwhile it may make balls
-/// larger.
+/// Calls `take(part)` for every open part until it returns false; meanwhile it may enlarge balls.
 template <class Take>
 class SurfaceSearch {
  public:
@@ -53,7 +52,7 @@ class SurfaceSearch {
       }
     }
     part.gap = std::max(0.0, gap);
-    // No ball need grow less for a smaller part, but for `finest`.
+    // No ball would need less growth for a smaller part, up to `finest`.
     if (least - part.gap <= finest_ || reach <= kSmallBesideGap * gap || depth >= kDeepest) {
       ended_ = !take_(part);
       return;
@@ -93,7 +92,7 @@ class VoidSearch {
     double half;
   };
 
-  /// The cube is settled, or is to be divided: then `kept` contains the balls that reach into it.
+  /// The cube is settled, or must be divided: then `kept` contains the balls that reach into it.
   enum class Verdict { settled, divide, open };
   Verdict look(const Cube& cube, const BallList& from, BallList& kept, OpenPlace& open) const {
     double gap = std::numeric_limits<double>::infinity();
@@ -111,7 +110,7 @@ class VoidSearch {
       kept.push_back(i);
     }
     if (crossing < 3 || may_rise(cube, kept)) return Verdict::settled;
-    // Where balls nearly coincide only this ends the division.
+    // If balls nearly coincide, only this ends the division.
     if (gap > 0 || cube.half < kSmallCube) {
       const double corner = 1.7320508075688774 * cube.half + kDistanceMargin;
       if (!solid_.inside(cube.middle)) {
@@ -144,7 +143,7 @@ class VoidSearch {
   }
 
  private:
-  /// Whether every point of the cube that is on spheres can move a little out of all of them and
+  /// True if every point of the cube that is on spheres can move a little out of all of them and
   /// up, so that none is the highest of a void.
   bool may_rise(const Cube& cube, const BallList& crossing) const {
     const Vector3d up(0.36, 0.48, 0.8);
@@ -171,8 +170,8 @@ BallList all_of(std::size_t count) {
   return all;
 }
 
-/// Those that no other ball contains whole: the union is the same without the others, and
-/// coincident spheres would cross everywhere.
+/// The balls that no other ball contains: the union is the same without the others, and coincident
+/// spheres would cross everywhere.
 BallList outermost(std::span<const CoverSphere> balls) {
   BallList list;
   for (std::uint32_t i = 0; i < balls.size(); ++i) {
@@ -208,7 +207,7 @@ std::vector<OpenPart> open_surface(const MeshView& mesh, std::span<const CoverSp
 
 OpenPlace open_void(const MeshSolid& solid, std::span<const CoverSphere> balls) {
   const VoidSearch search(solid, balls);
-  // Four levels at once, then a task a cube.
+  // Four levels at once, then one task per cube.
   std::vector<std::pair<VoidSearch::Cube, BallList>> cubes = {
       {{Vector3d::Zero(), 1.0 + 1e-9}, outermost(balls)}};
   for (int level = 0; level < 4; ++level) {

@@ -17,9 +17,8 @@ namespace ist {
 namespace {
 
 constexpr std::uint32_t kNoCandidate = UINT32_MAX;
-constexpr std::int64_t kStepsAPair = 20;  ///< that finding and sorting it costs
+constexpr std::int64_t kStepsAPair = 20;  ///< cost of finding and sorting it
 
-/// Which candidate contains which targets, in both directions.
 struct Incidence {
   std::vector<std::vector<std::uint32_t>> held;     ///< targets of a candidate
   std::vector<std::vector<std::uint32_t>> holders;  ///< candidates of a target, ascending
@@ -40,8 +39,7 @@ struct Incidence {
   std::int64_t pairs = 0;  ///< of a candidate and a target it contains
 };
 
-/// The state of the search: what a candidate would bring, and what a chosen one would be missed
-/// for.
+/// The state of the search: the gain of each candidate, and the loss without each chosen one.
 class Choice {
  public:
   explicit Choice(const Incidence& incidence)
@@ -61,7 +59,7 @@ class Choice {
 
   const std::vector<std::uint32_t>& chosen() const { return chosen_; }
   const std::vector<std::uint32_t>& open() const { return open_; }
-  std::int64_t steps() const { return steps_; }  ///< taken so far: pairs that were looked at
+  std::int64_t steps() const { return steps_; }  ///< taken so far: pairs examined
 
   std::uint32_t most_helpful() const {
     std::uint32_t best = kNoCandidate;
@@ -70,8 +68,8 @@ class Choice {
     return best;
   }
 
-  /// Among the candidates that contain the target, the one with the largest gain that has been out
-  /// since before `now`.
+  /// Among the candidates that contain the target, the one with the largest gain that has been
+  /// unchosen since before `now`.
   std::uint32_t most_helpful_for(std::uint32_t target, std::int64_t now) const {
     std::uint32_t best = kNoCandidate;
     for (const std::uint32_t j : incidence_.holders[target]) {
@@ -83,7 +81,8 @@ class Choice {
     return best;
   }
 
-  /// Among the chosen ones except `kept`, the one whose removal costs least; free ones go first.
+  /// Among the chosen ones except `kept`, the one whose removal costs least; those without cost
+  /// first.
   std::uint32_t least_missed(std::int64_t now, std::uint32_t kept) const {
     std::uint32_t best = kNoCandidate;
     const auto before = [&](std::uint32_t j, std::uint32_t k) {
@@ -98,7 +97,7 @@ class Choice {
     return best;
   }
 
-  /// `until`: it stays in until then.
+  /// `until`: it stays chosen until then.
   void put_in(std::uint32_t j, std::int64_t until) {
     count(incidence_.held[j]);
     in_[j] = 1;
@@ -165,7 +164,7 @@ class Choice {
 
   const Incidence& incidence_;
   std::vector<std::int64_t> weight_;    ///< of a target
-  std::vector<std::uint32_t> holders_;  ///< how many chosen ones contain a target
+  std::vector<std::uint32_t> holders_;  ///< number of chosen ones that contain a target
   std::vector<std::int64_t> gain_;      ///< weight of the open targets a candidate contains
   std::vector<std::int64_t> loss_;      ///< weight of the targets a chosen one alone contains
   std::vector<std::int64_t> since_;     ///< it stays as it is until this exchange
@@ -230,15 +229,15 @@ using Eigen::Vector3d;
 constexpr int kPasses = 3;                 ///< of exchanges and descent, of which the best counts
 constexpr int kRounds = 120;               ///< of a descent, over all balls
 constexpr std::size_t kTargetsABall = 60;  ///< on faces
-constexpr std::size_t kCandidates = 1200;  ///< that exchanges choose from, about
-constexpr std::size_t kCandidatesABall = 20;  ///< where shares of the level are asked for
-constexpr double kThinning = 0.3;             ///< levels between targets that exchanges look at
+constexpr std::size_t kCandidates = 1200;  ///< for exchanges, approximately
+constexpr std::size_t kCandidatesABall = 20;  ///< with shares of the level
+constexpr double kThinning = 0.3;             ///< levels between targets that exchanges use
 constexpr double kTightCell = 0.3;  ///< of the usual cells, where shares of the level are small
 constexpr std::size_t kExchanges = 1500;           ///< at a level
 constexpr std::int64_t kSteps = 100'000'000;       ///< of all exchanges of a pass
 constexpr std::int64_t kTightSteps = 500'000'000;  ///< the same with shares of the level
 constexpr int kLevels = 24;                        ///< that exchanges try
-constexpr double kFinest = 1e-3;  ///< of the level: how close the last radii are to just enough
+constexpr double kFinest = 1e-3;                   ///< of the level: precision of the final radii
 
 /// Centres of candidates, and how deep they lie.
 struct Candidates {
@@ -248,7 +247,7 @@ struct Candidates {
                       [&](std::size_t i) { depths[i] = depth_in(solid, centres[i]); });
   }
 
-  /// The largest balls around them, those that there are.
+  /// The largest balls around the centres, without empty ones.
   std::vector<CoverSphere> balls_at(const OffsetSurface& surface) const {
     std::vector<CoverSphere> balls;
     for (std::size_t i = 0; i < centres.size(); ++i)
@@ -268,7 +267,7 @@ std::vector<Vector3d> centres_of(const std::vector<CoverSphere>& balls,
   return centres;
 }
 
-/// The first target of every cell of a grid: of so many levels, or fewer where their share is
+/// The first target of every cell of a grid: cells of so many levels, or fewer where their share is
 /// small.
 std::vector<Vector3d> thinned(const SampledSolid& sampled, double cell) {
   std::unordered_set<std::uint64_t> seen, tight;
@@ -290,13 +289,13 @@ SampledSolid sampled_for(const MeshSolid& solid, std::size_t count, const LevelS
   return sampled;
 }
 
-/// Balls contain little of the surface where their share of the level is small: then more are
-/// tried.
+/// The number of candidates: more if balls contain little of the surface because their share of the
+/// level is small.
 std::size_t candidate_count(const SampledSolid& sampled, std::size_t usual, std::size_t count) {
   return sampled.share ? std::max(usual, kCandidatesABall * count) : usual;
 }
 
-/// The lowest level at which a greedy choice of balls around the medial axis is enough.
+/// The lowest level at which a greedy choice of balls around the medial axis suffices.
 LevelCover greedy_cover(const MeshSolid& solid, const SampledSolid& sampled, std::size_t count) {
   const Candidates candidates(
       solid, OffsetSurface(solid, sampled, 0).medial_centres(candidate_count(sampled, 800, count)));
@@ -315,13 +314,12 @@ LevelCover greedy_cover(const MeshSolid& solid, const SampledSolid& sampled, std
       low = level;
     }
   }
-  // One ball around the cube of the frame contains anything.
+  // One ball around the cube of the frame contains everything.
   if (best.centres.empty()) best = {{Vector3d::Zero()}, 2};
   return best;
 }
 
-/// Lowers the level, at first by the share `step`, as long as other candidates are found that are
-/// enough.
+/// Lowers the level, at first by the share `step`, as long as sufficient candidates are found.
 LevelCover exchanged(const MeshSolid& solid, const SampledSolid& sampled, LevelCover cover,
                      std::size_t count, double step, std::uint64_t seed,
                      const std::function<void()>& look) {
@@ -338,7 +336,7 @@ LevelCover exchanged(const MeshSolid& solid, const SampledSolid& sampled, LevelC
   std::int64_t steps = sampled.share ? kTightSteps : kSteps;
   for (int k = 0; k < kLevels && factor < 0.99 && steps > 0; ++k) {
     const double level = cover.level * factor;
-    // Tight edges are contained by balls for their level alone.
+    // Tight edges are contained only by balls for their level.
     if (sampled.share) candidates = candidates_at(level);
     const std::vector<CoverSphere> balls =
         candidates.balls_at(OffsetSurface(solid, sampled, level));
@@ -353,7 +351,7 @@ LevelCover exchanged(const MeshSolid& solid, const SampledSolid& sampled, LevelC
   return cover;
 }
 
-/// The protrusion of the ball that reaches furthest; `enough` if none reaches so far.
+/// The protrusion of the ball that protrudes most; `enough` if none protrudes more.
 double largest_protrusion(const MeshSolid& solid, const std::vector<CoverSphere>& balls,
                           double enough) {
   std::vector<double> most(balls.size());
@@ -375,7 +373,7 @@ std::size_t CoverSearch::greedy_count(double level, std::size_t enough) const {
                 .balls_at(surface),
             thinned(sampled, 0.5 * level))
             .size();
-    // More balls need more samples to be told apart.
+    // More balls need more samples to be distinguished.
     if (!share_ || 2 * found < 3 * count || found > enough || count >= kMostCoverSpheres)
       return found;
     count = std::min(2 * found, kMostCoverSpheres);
@@ -391,8 +389,7 @@ LeveledBalls CoverSearch::with_count(std::size_t count) const {
     const double share = 0.2 + 0.7 * pass / kPasses;
     const std::function<void()> look = [&] { look_(share); };
     look();
-    // Samples alone know no level as low as it is called; after a descent it is that of the
-    // surface.
+    // Samples alone underestimate the level; after a descent it is that of the surface.
     const double step = pass == 0 ? 0.1 : 0.05;
     const double before = start.level;
     start = exchanged(solid_, sampled, std::move(start), count, step,

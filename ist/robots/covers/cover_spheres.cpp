@@ -23,7 +23,7 @@
 namespace ist {
 namespace {
 
-/// Equal meshes of which as many spheres are asked for, and their covers by count.
+/// Equal meshes with the same number of spheres, and their covers by count.
 struct CoverPart {
   const ClosedMesh* mesh;
   std::size_t count;           ///< 0: a share of the total
@@ -38,7 +38,7 @@ bool equal(const ClosedMesh& a, const ClosedMesh& b) {
   return a.mesh.triangles == b.mesh.triangles && a.mesh.vertices == b.mesh.vertices;
 }
 
-/// Adds to `parts`, for each mesh, the part that it belongs to; says which.
+/// Adds to `parts`, for each mesh, the part that it belongs to; returns the part's index for each.
 std::vector<std::size_t> parts_of(std::span<const ClosedMesh> meshes,
                                   const SphereCoverSettings& settings,
                                   std::vector<CoverPart>& parts) {
@@ -60,10 +60,10 @@ std::vector<std::size_t> parts_of(std::span<const ClosedMesh> meshes,
   return part_of;
 }
 
-/// Shares the total among the parts without a count: evenly at first, then by what was measured.
-/// The counts whose largest protrusion was the smallest.
+/// Distributes the total among the parts without a count: evenly at first, then by the measured
+/// protrusions. Returns the counts whose largest protrusion was the smallest.
 ///
-/// `cover(counts)` is to cover each part with so many spheres. Throws Error where the total is too
+/// `cover(counts)` must cover each part with so many spheres. Throws Error if the total is too
 /// small.
 std::vector<std::size_t> shared_counts(
     const std::vector<CoverPart>& parts, std::size_t total,
@@ -144,7 +144,7 @@ class Watch {
   WorkStop stop_;
 };
 
-/// The sphere in the mesh's frame, made larger by what rounding moves its centre.
+/// The sphere in the mesh's frame, enlarged by the rounding of its centre.
 CoverSphere in_mesh_frame(const CoverSphere& ball, const UnitFrame& frame) {
   const Vector3d centre = frame.from_unit(ball.centre);
   const double moved =
@@ -211,8 +211,8 @@ CoverSearch search_of(const MeshSolid& solid, std::uint64_t seed, std::function<
           most / solid.frame().scale()};
 }
 
-/// The fewest spheres that reach no further than asked: doubles the count until it is enough, then
-/// bisects.
+/// The fewest spheres with a sufficiently small protrusion: doubles the count until it is enough,
+/// then bisects.
 SphereCover fewest(const MeshSolid& solid, const CoverSearch& search,
                    const SphereCoverSettings& settings, bool room) {
   int tries = 0;
@@ -261,7 +261,7 @@ SphereCover cover_one(const CoverPart& part, const SphereCoverSettings& settings
       solid, settings.seed,
       [&](double share) {
         const double before = done.load();
-        if (share > before) done = share;  // one thread at a time gets further
+        if (share > before) done = share;  // one thread at a time advances
         watch.look(before, std::max(before, share));
       },
       settings.max_protrusion, part.room == nullptr ? none : *part.room, kLeastShare);
@@ -316,7 +316,7 @@ std::vector<SphereCover> cover_with_spheres(std::span<const ClosedMesh> meshes,
   }
   std::vector<SphereCover> covers;
   for (const std::size_t i : part_of) {
-    // Fewer spheres may reach less far: the search is a heuristic.
+    // Fewer spheres may protrude less: the search is a heuristic.
     const auto end = parts[i].tried.upper_bound(counts[i]);
     const auto best =
         std::min_element(parts[i].tried.begin(), end, [](const auto& a, const auto& b) {

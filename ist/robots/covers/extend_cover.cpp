@@ -18,7 +18,7 @@ using Corners = HalvableTriangle;
 constexpr double kFineness =
     0.25;                        ///< a part is no wider than this share of the largest protrusion
 constexpr double kGrowth = 0.1;  ///< by which spheres grow, of the largest protrusion
-constexpr std::size_t kFewest = 8;  ///< spheres that may be added; else as many as there are
+constexpr std::size_t kFewest = 8;  ///< spheres that may be added; else as many as exist
 constexpr double kMargin = 1e-12;   ///< for rounding, of the coordinates
 
 double farthest(const Corners& t, const Vector3d& from) {
@@ -27,7 +27,7 @@ double farthest(const Corners& t, const Vector3d& from) {
   return std::sqrt(square) + kMargin * (t[0].norm() + from.norm());
 }
 
-/// Finds the parts of a surface that no sphere contains whole.
+/// Finds the parts of a surface that are in no single sphere.
 class OpenParts {
  public:
   OpenParts(std::vector<CoverSphere>& spheres, double growth, double finest)
@@ -48,7 +48,7 @@ class OpenParts {
       for (const Corners& half : halves(t, side.from)) look(half);
       return;
     }
-    // Growing is cheap, and adds up.
+    // Growing costs little, and accumulates.
     const double grown = best == nullptr ? 0 : grown_[best - spheres_.data()] + least;
     if (best == nullptr || grown > growth_) return open.push_back(t);
     best->radius += least;
@@ -65,12 +65,12 @@ class OpenParts {
   std::map<std::ptrdiff_t, double> grown_;
 };
 
-/// Parts that one sphere is to contain.
+/// Parts that one sphere must contain.
 struct Cluster {
   std::vector<Corners> parts;
   Eigen::AlignedBox3d box;
   CoverSphere sphere;
-  double reach = 0;  ///< no point of the sphere is farther from the parts
+  double reach = 0;  ///< bound on the distance of the sphere's points from the parts
 
   explicit Cluster(std::vector<Corners> given) : parts(std::move(given)) {
     for (const Corners& t : parts)

@@ -47,7 +47,7 @@ OffsetSurface::OffsetSurface(const MeshSolid& solid, const SampledSolid& sampled
 }
 
 double OffsetSurface::radius(const Vector3d& centre, double depth) const {
-  // By so much a point beside the nearest place is further than that.
+  // The excess distance of a point beside the nearest place.
   const auto coarse = [&](double seen) { return spacing_ * spacing_ / (2 * seen); };
   const auto kept = [&](double radius) {
     const PointGrid::Nearest near = tight_.nearest(centre, radius, radius);

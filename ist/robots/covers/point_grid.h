@@ -15,7 +15,7 @@
 
 namespace ist {
 
-/// A name for the cell of a grid that contains a point of the unit frame.
+/// The key of the grid cell that contains a point of the unit frame.
 inline std::uint64_t cell_key(const Eigen::Vector3d& p, double cell) {
   std::uint64_t key = 0;
   for (int k = 0; k < 3; ++k) {
@@ -25,8 +25,8 @@ inline std::uint64_t cell_key(const Eigen::Vector3d& p, double cell) {
   return key;
 }
 
-/// Points in the cells of a grid, made for being rebuilt often: those of a row of cells lie side by
-/// side. Distances are float: what is found is for searches, not for proofs.
+/// Points in the cells of a grid that is rebuilt often: those of a row of cells are adjacent in
+/// memory. Distances are float: results are for searches, not for proofs.
 class PointGrid {
  public:
   struct Nearest {
@@ -40,7 +40,7 @@ class PointGrid {
 
   std::uint32_t size() const { return static_cast<std::uint32_t>(in_cells_.items.size()); }
 
-  /// Places of points are numbered by the grid's own order.
+  /// The index of a point, given its place in the grid's own order.
   std::uint32_t index(std::uint32_t place) const {
     return in_cells_.items[place];
   }  ///< as they were given
@@ -60,8 +60,8 @@ class PointGrid {
       for (int y = y_from; y <= y_to; ++y) scan_row(c, y, z, reach * reach, visit);
   }
 
-  /// The nearest point within `limit`, of equals that with the smallest place. The search tries
-  /// `guess` first.
+  /// The nearest point within `limit`, among equals the one with the smallest place. The search
+  /// starts with the radius `guess`.
   Nearest nearest(const Eigen::Vector3d& p, double guess, double limit) const {
     const Eigen::Vector3f c = p.cast<float>();
     // Rows are visited outward from the middle, since near points prune the others.
@@ -112,7 +112,7 @@ class PointGrid {
   void scan(const Eigen::Vector3f& c, std::uint32_t from, std::uint32_t to, float reach2,
             const Visit& visit) const {
     for (std::uint32_t i = from; i < to; i += kLanes) {
-      std::array<float, kLanes> d2;  // the arrays are so much longer than the points
+      std::array<float, kLanes> d2;  // the arrays are longer than the points by so much
       for (std::uint32_t k = 0; k < kLanes; ++k) {
         const float x = xyz_[0][i + k] - c.x(), y = xyz_[1][i + k] - c.y(),
                     z = xyz_[2][i + k] - c.z();
@@ -124,7 +124,7 @@ class PointGrid {
     }
   }
 
-  /// First and last cell of an interval along an axis; it is empty where the first is above.
+  /// First and last cell of an interval along an axis; empty if the first is above the last.
   std::pair<int, int> cells(std::size_t axis, float low, float high) const {
     const auto last = static_cast<float>(count_[axis] - 1);
     const float from = (low - low_[axis]) * per_cell_, to = (high - low_[axis]) * per_cell_;
@@ -133,7 +133,7 @@ class PointGrid {
             static_cast<int>(std::clamp(to + 0.01f, 0.0f, last))};
   }
 
-  /// From a coordinate to a cell, or a little less.
+  /// The distance from a coordinate to a cell, or slightly less.
   float outside(std::size_t axis, int cell, float x) const {
     const float from = low_[axis] + static_cast<float>(cell) * cell_;
     return std::max({0.0f, from - x - 0.01f * cell_, x - from - 1.01f * cell_});

@@ -17,10 +17,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kRounded = 1e-5;  ///< unit frame, by which the proof may end above what was seen
+constexpr double kRounded = 1e-5;  ///< unit frame, by which the proof may exceed the maximum found
 constexpr double kTolerance = 0.01;
 
-/// Divides the cube around a ball until no part can contain a point further out than was seen.
+/// Divides the cube around a ball until no part can contain a point further out than found.
 class ProtrusionSearch {
  public:
   ProtrusionSearch(const MeshSolid& solid, const CoverSphere& ball, double tolerance, double enough,
@@ -30,10 +30,10 @@ class ProtrusionSearch {
   BallProtrusion found() {
     const ClosestPoint near = closest(ball_.centre);
     const bool inside = solid_.inside(ball_.centre);
-    // No point of the ball is further out than its centre and its radius together.
+    // No point of the ball is further out than its centre's distance plus its radius.
     whole_ =
         std::max(0.0, ball_.radius + (inside ? -near.distance : near.distance)) + kDistanceMargin;
-    // Where the solid is convex, this is the furthest.
+    // If the solid is convex, this is the furthest point.
     if (near.distance > 0)
       see(ball_.centre +
           (near.point - ball_.centre) * ((inside ? 1 : -1) * 2 * ball_.radius / near.distance));
@@ -42,7 +42,7 @@ class ProtrusionSearch {
   }
 
  private:
-  /// Where points beyond are asked for, nothing is proven, and float is good enough.
+  /// If points beyond are requested, nothing is proven, and float is accurate enough.
   ClosestPoint closest(const Vector3d& x) const {
     if (beyond_ == nullptr) return solid_.closest_point(x);
     const Eigen::Vector3f p = x.cast<float>();
@@ -58,17 +58,17 @@ class ProtrusionSearch {
 
   void settle(double bound) { result_.most = std::max(result_.most, bound); }
 
-  /// `outside`: the whole cube is known to be.
+  /// `outside`: the whole cube is known to be outside.
   void look(const Vector3d& middle, double half, bool outside) {
     const Eigen::Array3d off = (middle - ball_.centre).array().abs();
     const double nearest = std::sqrt((off - half).max(0.0).matrix().squaredNorm());
-    if (nearest > ball_.radius) return;  // not of the ball
+    if (nearest > ball_.radius) return;  // disjoint from the ball
     if (whole_ <= threshold()) return settle(whole_);
     const double corner = 1.7320508075688774 * half;
     const ClosestPoint near = closest(middle);
     double bound = std::min(whole_, near.distance + corner);
     if (bound <= threshold()) return settle(bound);
-    // No surface is so near that a part of the cube could lie on its other side.
+    // No surface is near enough for a part of the cube to lie on its other side.
     const bool one_sided = near.distance > corner + kDistanceMargin;
     if (!outside && solid_.inside(middle)) {
       if (one_sided) return;
@@ -85,7 +85,7 @@ class ProtrusionSearch {
     for (int k = 0; k < 8; ++k) look(middle_of_part(middle, half, k), half / 2, outside);
   }
 
-  /// A point of the ball near `middle` is looked at: how far out it is.
+  /// Measures how far out a point of the ball near `middle` is.
   void see(Vector3d point) {
     const Vector3d d = point - ball_.centre;
     const double length = std::sqrt(d.squaredNorm());
@@ -101,8 +101,8 @@ class ProtrusionSearch {
   }
 
   /// Bounds the distance of the ball's points in the cube from the point `near` of the solid: along
-  /// the line from it to the middle they reach no further than the ball does, and across it no
-  /// further than the cube.
+  /// the line from it to the middle they reach no further than the ball, and across it no further
+  /// than the cube.
   double by_plane(const Vector3d& middle, double corner, const ClosestPoint& near) const {
     const Vector3d n = (middle - near.point) / near.distance;
     const double ahead =
@@ -112,7 +112,7 @@ class ProtrusionSearch {
     return std::sqrt(along * along + corner * corner) + kDistanceMargin;
   }
 
-  static constexpr double kFinest = 1e-4;  ///< of the radius: less protrusion is not told apart
+  static constexpr double kFinest = 1e-4;  ///< of the radius: smaller protrusions are not resolved
 
   const MeshSolid& solid_;
   const CoverSphere& ball_;
@@ -122,8 +122,8 @@ class ProtrusionSearch {
   BallProtrusion result_;
 };
 
-/// Points spread over the unit sphere, from a lattice on the cube, and the share of its area each
-/// stands for.
+/// Points spread over the unit sphere, from a lattice on the cube, and the share of its area that
+/// each represents.
 struct SpherePoint {
   Vector3d direction;
   double share;
@@ -242,7 +242,7 @@ SphereProtrusion protrusion_of(const MeshSolid& solid, std::span<const CoverSphe
     if (below >= 0.95 * area) break;
   }
 
-  // Proven, ball by ball; what stays below the largest that was seen need not be told closer.
+  // Proven, ball by ball; bounds below the largest protrusion found need not be tight.
   std::vector<BallProtrusion> each(count);
   std::size_t first = 0;
   for (std::size_t i = 0; i < count; ++i)

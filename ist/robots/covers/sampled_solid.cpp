@@ -18,9 +18,9 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kLongestRay = 4;  ///< unit frame: beyond any protrusion
-constexpr double kSharp = 0.85;    ///< cosine between faces whose edge is an edge of the solid
-constexpr double kOff = 1e-6;      ///< unit frame: a step off the surface
-constexpr double kTight = 0.5;     ///< share of the level: less is sampled more densely
+constexpr double kSharp = 0.85;  ///< cosine between faces whose common edge is an edge of the solid
+constexpr double kOff = 1e-6;    ///< unit frame: a step off the surface
+constexpr double kTight = 0.5;   ///< share of the level: less is sampled more densely
 constexpr std::size_t kMostInside = 1500;
 
 struct Face {
@@ -43,7 +43,7 @@ std::vector<Face> faces_of(const MeshView& mesh) {
   return faces;
 }
 
-/// Remembers places by the cell of a grid and the side that they face.
+/// Records places by grid cell and the side that they face.
 class Thinning {
  public:
   explicit Thinning(double cell) : cell_(cell) {}
@@ -66,7 +66,7 @@ struct Sample {
   double share = 1;
 };
 
-/// Middles of the parts of a face, halved across its longest side until no side is above `longest`.
+/// Middles of the parts of a face, halved across its longest side until no side exceeds `longest`.
 void sample_face(const Face& face, double longest, Thinning& thinning, std::vector<Sample>& out) {
   std::vector<HalvableTriangle> open = {face.corners};
   while (!open.empty()) {
@@ -87,7 +87,7 @@ struct EdgeSamples {
   std::vector<Sample> fans;  ///< directions between the two faces' normals
 };
 
-/// Points on edges where faces meet at an angle, and on their ends.
+/// Points on edges where faces meet at an angle, and at their ends.
 EdgeSamples sample_edges(const MeshView& mesh, const std::vector<Face>& faces, double spacing) {
   std::vector<Triangle> triangles(mesh.triangle_count);
   for (std::uint32_t t = 0; t < mesh.triangle_count; ++t)
@@ -119,8 +119,8 @@ EdgeSamples sample_edges(const MeshView& mesh, const std::vector<Face>& faces, d
   return out;
 }
 
-/// The distance at which the ray's foot is still the surface's nearest point: a ball that touches
-/// the foot and contains no other point of the mesh in the end.
+/// The distance up to which the ray's foot is the surface's nearest point: a ball that touches the
+/// foot and contains no other point of the mesh.
 double reach_of(const MeshSolid& solid, const Sample& sample) {
   double radius = kLongestRay;
   for (int step = 0; step < 12; ++step) {
@@ -197,7 +197,7 @@ SampledSolid sample_solid(const MeshSolid& solid, std::size_t targets, LevelShar
   for (const Sample& s : fine)
     if (s.share < kTight) out.targets.push_back(s.point);
   out.tight = out.targets.size();
-  // Balls near edges are small, so that rays stand close there; elsewhere as far apart as targets.
+  // Balls near edges are small, so rays are denser there; elsewhere as dense as targets.
   const PointGrid on_edges(edges.points);
   const double close = 3 * out.spacing;
   std::erase_if(fine, [&](const Sample& s) {

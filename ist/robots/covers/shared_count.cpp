@@ -16,7 +16,7 @@ double estimated_protrusion(const TriedCounts& tried, std::size_t count) {
   double least = std::numeric_limits<double>::infinity();
   for (auto one = tried.begin(); one != above; ++one) least = std::min(least, one->second);
   const auto n = static_cast<double>(count);
-  // Where balls of level E contain a curved surface, their number goes with 1 / E.
+  // If balls of level E contain a curved surface, their number is proportional to 1 / E.
   if (above == tried.begin()) return above->second * static_cast<double>(above->first) / n;
   const auto below = std::prev(above);
   if (below->first == count) return least;

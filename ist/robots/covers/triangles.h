@@ -9,7 +9,7 @@
 
 namespace ist {
 
-/// The corners of a triangle that is cut into ever smaller ones.
+/// The corners of a triangle that is divided recursively.
 using HalvableTriangle = std::array<Eigen::Vector3d, 3>;
 
 struct LongestSide {
@@ -17,7 +17,7 @@ struct LongestSide {
   double length2 = 0;
 };
 
-/// The first of several that are as long.
+/// The first among several of equal length.
 inline LongestSide longest_side(const HalvableTriangle& t) {
   LongestSide longest{0, -1};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -27,7 +27,7 @@ inline LongestSide longest_side(const HalvableTriangle& t) {
   return longest;
 }
 
-/// A triangle cut from the middle of a side to the corner opposite, turned as it was.
+/// A triangle cut from the middle of a side to the opposite corner, with the same orientation.
 inline std::array<HalvableTriangle, 2> halves(const HalvableTriangle& t, std::size_t side) {
   const Eigen::Vector3d &a = t[side], &b = t[(side + 1) % 3], &c = t[(side + 2) % 3];
   const Eigen::Vector3d middle = (a + b) / 2;

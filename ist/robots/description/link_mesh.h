@@ -12,10 +12,9 @@
 
 namespace ist {
 
-/// The mesh of a shape in its link's frame; mirrored meshes are turned, so that they keep their
-/// outside. A box is exact. A cylinder, capsule or ellipsoid is a polyhedron that holds it, and
-/// is `slack` [u] wider at most.
-/// `file`: for messages. Throws Error naming the URDF's line.
+/// The mesh of a shape in its link's frame; mirrored meshes are flipped, so that they keep their
+/// outside. A box is exact. A cylinder, capsule or ellipsoid is a polyhedron that contains it, and
+/// is at most `slack` [u] wider. `file`: for messages. Throws Error naming the URDF's line.
 struct ShapeMesh {
   TriangleMesh mesh;
   double slack = 0;
@@ -28,11 +27,11 @@ ShapeMesh capsule_mesh(const CoverCapsule& capsule);
 /// Adds the vertices and triangles of another mesh.
 void append_mesh(TriangleMesh& mesh, const TriangleMesh& more);
 
-/// Shapes of a link as one mesh; spheres are spheres and stay so.
+/// Shapes of a link as one mesh; spheres stay spheres.
 struct LinkGeometry {
-  TriangleMesh mesh;                 ///< empty where the link has spheres alone
+  TriangleMesh mesh;                 ///< empty if the link has only spheres
   std::vector<CoverSphere> spheres;  ///< [u], link frame
-  double slack = 0;                  ///< [u] the mesh reaches no further beyond the shapes
+  double slack = 0;                  ///< [u] bound on the excess of the mesh over the shapes
 };
 LinkGeometry geometry_of(std::span<const PlacedLinkShape> shapes, const PackagePaths& paths,
                          const std::string& file);

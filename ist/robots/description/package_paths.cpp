@@ -73,13 +73,13 @@ std::string PackagePaths::find_as_written(const std::string& name) const {
   }
   for (const fs::path& folder : folders) {
     if (is_file(folder / package / inside)) return (folder / package / inside).string();
-    // A package's folder may have another name than the package: then its manifest or the file
-    // itself tells.
+    // A package's folder may have another name than the package: then its manifest or the existing
+    // file identifies it.
     if ((folder.filename() == package || is_file(folder / "package.xml")) &&
         is_file(folder / inside))
       return (folder / inside).string();
   }
-  // Without any manifest, a folder above the URDF that holds the file.
+  // Without any manifest, a folder above the URDF that contains the file.
   for (fs::path up = folder_;; up = up.parent_path()) {
     if (is_file(up / inside)) return (up / inside).string();
     if (up == up.parent_path()) break;

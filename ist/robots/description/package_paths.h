@@ -7,19 +7,18 @@
 
 namespace ist {
 
-/// Where packages lie that file names speak of.
 class PackagePaths {
  public:
   /// `urdf`: the robot's file; relative names are relative to its folder. `named`: folders of
-  /// packages by name; they come first. Then the folders of the environment's ROS_PACKAGE_PATH
-  /// (`ros_path`, parted by colons), then every folder above the URDF: each may be the package or
-  /// hold it.
+  /// packages by name, which come first. Then the folders of the environment's ROS_PACKAGE_PATH
+  /// (`ros_path`, separated by colons), then every folder above the URDF: each may be the package
+  /// or contain it.
   PackagePaths(const std::filesystem::path& urdf, std::map<std::string, std::string> named,
                const std::string& ros_path);
 
   /// The file of a name: package://NAME/REST (or model://, or with a third slash), file://PATH or a
-  /// path; where that is not there, the same with %20 and the like decoded. Throws Error that tells
-  /// where it was looked for; the file exists.
+  /// path; if that does not exist, the same with %20 and the like decoded. Throws Error that lists
+  /// where it was searched; otherwise the file exists.
   std::string find(const std::string& name) const;
 
  private:

@@ -63,7 +63,7 @@ class SdfReader final : RobotXml {
     return out;
   }
 
-  /// The <pose> of an element; `relative_to`: what it is relative to, if the file says so.
+  /// The <pose> of an element; `relative_to`: its reference frame, if the file states one.
   Eigen::Isometry3d pose(std::uint32_t element, std::string& relative_to) const {
     const std::uint32_t e = xml_.child(element, "pose");
     if (e == kNoTag) return Eigen::Isometry3d::Identity();
@@ -124,7 +124,7 @@ class SdfReader final : RobotXml {
     joint.name = name_of(e);
     const std::size_t parent = end("parent"), child = end("child");
     std::string to;
-    Eigen::Isometry3d at = pose(e, to);  // in the child's frame, unless it says otherwise
+    Eigen::Isometry3d at = pose(e, to);  // in the child's frame by default
     const Eigen::Isometry3d child_frame = frame_of(child), parent_frame = frame_of(parent);
     if (to == "__model__")
       at = child_frame.inverse() * at;
@@ -166,7 +166,7 @@ class SdfReader final : RobotXml {
     }
     take_axis(axis, along, joint);
     const std::uint32_t limit = xml_.child(axis, "limit");
-    constexpr double kEndless = 1e15;  // what writers give for no limit at all
+    constexpr double kEndless = 1e15;  // value that writers use for no limit
     const auto [lower, upper] =
         limit == kNoTag ? std::pair(-kEndless, kEndless) : limits_of(limit, kEndless);
     const bool limited = lower > -kEndless && upper < kEndless;

@@ -50,7 +50,7 @@ class UrdfReader final : RobotXml {
       } else if (xml_[e].name == "visual") {
         try {
           link.visual.push_back(read_placed(e));
-        } catch (const Error& error) {  // most robots are never read by these shapes
+        } catch (const Error& error) {  // most robots are never read for these shapes
           link.visual.emplace_back().shape = LinkFault{error.what()};
         }
       }

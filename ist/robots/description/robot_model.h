@@ -13,14 +13,14 @@
 
 #include "mesh/import/source_file.h"
 
-// Robots as URDF files describe them: links, and the shapes that stand for them.
+// Robots described by URDF files: links, and their shapes.
 
 namespace ist {
 
 struct LinkMesh {
   std::string file;  ///< as the URDF names it: a path, file://… or package://…
-  Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< not 0; below 0 it mirrors
-  /// Bytes of the URDF: the name, first and behind the last.
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< not 0; negative values mirror
+  /// Bytes of the URDF: the name, first and past the last.
   std::size_t name_begin = 0, name_end = 0;
 };
 struct LinkBox {
@@ -38,7 +38,7 @@ struct LinkCapsule {
 struct LinkEllipsoid {
   Eigen::Vector3d radii = Eigen::Vector3d::Ones();  ///< [u] > 0
 };
-/// A visual shape that is not as it should be: an error where it is used.
+/// An invalid visual shape: an error if it is used.
 struct LinkFault {
   std::string what;  ///< with file and line
 };
@@ -53,13 +53,13 @@ struct PlacedLinkShape {
   std::size_t line = 0;                                   ///< of the file; 0: of an included one
 };
 
-/// Which of a link's two sets of shapes is meant.
+/// One of a link's two sets of shapes.
 enum class LinkShapes { collision, visual };
 
 struct RobotLink {
   std::string name;
   std::vector<PlacedLinkShape> collision, visual;
-  /// Bytes of the file: the link's element, and each <collision> in it, first and behind the last.
+  /// Bytes of the file: the link's element, and each <collision> in it, first and past the last.
   std::size_t begin = 0, end = 0;
   std::vector<std::pair<std::size_t, std::size_t>> collision_bytes;
 
@@ -70,22 +70,23 @@ struct RobotLink {
 
 inline constexpr std::size_t kNone = SIZE_MAX;  ///< no link or joint
 
-/// The joint of a link and its parent. Joints of several axes and slides without limits are
-/// taken as fixed.
+/// The joint of a link and its parent. Joints of several axes and slides without limits are taken
+/// as fixed.
 struct RobotJoint {
   enum class Motion { fixed, turning, sliding };
   std::string name;
   std::size_t parent = 0, child = 0;                         ///< links
   Eigen::Isometry3d origin = Eigen::Isometry3d::Identity();  ///< of the child, at position 0
   Motion motion = Motion::fixed;
-  bool taken_as_fixed = false;                      ///< though it moves in the file
+  bool taken_as_fixed = false;                      ///< although it moves in the file
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< of length 1, in the child's frame
   double lower = 0, upper = 0;                      ///< [rad] or [u]
-  /// The joint that moves this one, which stands at multiplier · (its position) + offset; or kNone.
+  /// The joint that moves this one, whose position is multiplier · (its position) + offset; or
+  /// kNone.
   std::size_t mimics = kNone;
   double multiplier = 1, offset = 0;
 
-  /// Whether a planner sets its position.
+  /// True if a planner sets its position.
   bool is_free() const { return motion != Motion::fixed && mimics == kNone; }
 };
 
@@ -102,24 +103,24 @@ struct RobotModel {
   std::vector<std::pair<std::size_t, std::size_t>> excluded;  ///< links that the file ignores
 };
 
-/// The index of the link or joint of that name; their number if there is none.
+/// The index of the link or joint of that name; the number of items if there is none.
 template <class Item>
 std::size_t index_named(const std::vector<Item>& items, std::string_view name) {
   const auto is_it = [&](const Item& one) { return one.name == name; };
   return static_cast<std::size_t>(std::find_if(items.begin(), items.end(), is_it) - items.begin());
 }
 
-/// Reads a URDF, or an MJCF or SDF as read_mjcf() and read_sdf() do. Strict where a mistake would
-/// move or lose a shape: numbers must be finite, lengths above 0, joints must make one tree of the
-/// links. A faulty visual shape becomes a LinkFault. Other elements are ignored. Document types are
-/// refused, and with them entities. Throws Error (file, line, fault, advice).
+/// Reads a URDF, or an MJCF or SDF like read_mjcf() and read_sdf(). Strict if a mistake would move
+/// or lose a shape: numbers must be finite, lengths positive, and joints must form one tree of the
+/// links. A faulty visual shape becomes a LinkFault. Other elements are ignored. Document types,
+/// and with them entities, are refused. Throws Error (file, line, fault, advice).
 RobotModel read_robot(const std::string& path);
 
-/// The same of a file already in memory.
+/// The same for a file in memory.
 RobotModel read_robot(SourceFile file);
 
-/// The shortest turn of the z axis onto a direction, which is not 0. Eigen's FromTwoVectors has a
-/// decomposition for directions that are opposite, which takes seconds to compile.
+/// The shortest rotation of the z axis onto a direction, which is not 0. Eigen's FromTwoVectors
+/// uses a decomposition for opposite directions, which takes seconds to compile.
 inline Eigen::Quaterniond turn_from_z(const Eigen::Vector3d& direction) {
   const Eigen::Vector3d to = direction.normalized();
   if (to.z() < -1 + 1e-12) return {0, 1, 0, 0};

@@ -21,8 +21,8 @@ namespace ist {
 
 inline constexpr std::uint32_t kNoTag = XmlDocument::kNone;
 
-/// What the readers of URDF and SDF share: values, shapes, joints' ends and limits, and the tree of
-/// links. An element states a value by name: URDF in an attribute, SDF in a child.
+/// The common parts of the readers of URDF and SDF: values, shapes, joints' ends and limits, and
+/// the tree of links. An element states a value by name: URDF in an attribute, SDF in a child.
 class RobotXml {
  public:
   explicit RobotXml(RobotModel& robot) : robot_(robot), xml_(robot.file) {}
@@ -66,7 +66,7 @@ class RobotXml {
     return name;
   }
 
-  /// As many numbers as `otherwise`, which stands for a value that is not there.
+  /// Reads as many numbers as `otherwise`, which is the default of a missing value.
   std::vector<double> numbers(std::uint32_t e, std::string_view name,
                               std::vector<double> otherwise) const {
     const std::string words = text(e, name);
@@ -82,7 +82,7 @@ class RobotXml {
     const std::vector<double> v = numbers(e, name, {otherwise.x(), otherwise.y(), otherwise.z()});
     return {v[0], v[1], v[2]};
   }
-  /// [u] Above 0, or an error.
+  /// [u] Positive, or an error.
   std::vector<double> lengths(std::uint32_t e, std::string_view name, std::size_t count) const {
     const std::vector<double> values = numbers_of(e, name, text(e, name), count);
     for (const double x : values)
@@ -125,7 +125,7 @@ class RobotXml {
     return 1 + static_cast<std::size_t>(std::count(before.begin(), before.end(), '\n'));
   }
 
-  /// `file`: of a mesh, and how it is given.
+  /// `file`: of a mesh, and how it is specified.
   LinkShape shape_of(std::uint32_t e, const std::string& file, const std::string& how) const {
     const std::string_view kind = xml_[e].name;
     if (kind == "mesh") {
@@ -152,7 +152,7 @@ class RobotXml {
     xml_.fail(e, "is not read. Use mesh, box, cylinder, sphere, capsule or ellipsoid");
   }
 
-  /// `others`: types that are taken as fixed, each behind a blank.
+  /// `others`: types that are taken as fixed, each after a blank.
   void read_type(std::uint32_t e, std::string_view others, RobotJoint& joint) const {
     const std::string type(xml_.attribute(e, "type"));
     if (type == "revolute" || type == "continuous")
@@ -175,7 +175,7 @@ class RobotXml {
     joint.axis = axis.normalized();
   }
 
-  /// `endless`: what stands for no limit, and where larger ones may stand; 0: nowhere.
+  /// `endless`: the value for no limit, and where larger ones are allowed; 0: nowhere.
   std::pair<double, double> limits_of(std::uint32_t limit, double endless) const {
     const double largest = endless > 0 ? HUGE_VAL : kLargest;
     const std::pair out(real(limit, "lower", 0 - endless, largest),
@@ -193,7 +193,7 @@ class RobotXml {
     robot_.joints.push_back(std::move(joint));
   }
 
-  /// `mimic`: the element that names another joint; `moves`: whether that one moves on its own.
+  /// `mimic`: the element that names another joint; `moves`: whether that joint moves by itself.
   template <class Moves>
   void read_mimic(std::uint32_t mimic, RobotJoint& joint, const Moves& moves) const {
     const std::string name = decoded(xml_.attribute(mimic, "joint"));
@@ -208,7 +208,7 @@ class RobotXml {
     joint.offset = real(mimic, "offset", 0);
   }
 
-  /// Every link but one is the child of one joint, and none its own ancestor.
+  /// Requires that every link but one is the child of one joint, and none its own ancestor.
   void require_tree(std::uint32_t model) {
     const std::size_t count = robot_.links.size();
     robot_.joint_of.assign(count, kNone);

@@ -19,14 +19,14 @@ namespace {
 using Eigen::Vector3d;
 using Body = SphereBody;
 
-constexpr std::size_t kSamples = 2000;   ///< of all joints, at most; as many measure
-constexpr std::size_t kMoreSamples = 5;  ///< times as many of the joints between two links
-constexpr double kTests = 1e9;           ///< of spheres, about, at most
-constexpr double kLimitShare = 0.1;      ///< of positions drawn that are a limit
+constexpr std::size_t kSamples = 2000;   ///< of all joints, at most; the same number again measures
+constexpr std::size_t kMoreSamples = 5;  ///< multiple, for the joints between two links
+constexpr double kTests = 1e9;           ///< of spheres, approximate maximum
+constexpr double kLimitShare = 0.1;      ///< share of the drawn positions that are a limit
 constexpr double kWorthIgnoring = 0.01;  ///< share of positions in which spheres overlap
-constexpr std::size_t kFree = 200;       ///< positions without a collision that are to decide
+constexpr std::size_t kFree = 200;       ///< positions without a collision that decide
 constexpr std::size_t kDraws = 100'000;  ///< for them, at most
-constexpr int kPosesACount = 40;         ///< searched with so many joints moved
+constexpr int kPosesACount = 40;         ///< searched for each number of moved joints
 
 bool overlap(const Body& a, const Body& b, const Eigen::Isometry3d& b_in_a) {
   const auto meet = [](const CoverSphere& p, const CoverSphere& q, const Vector3d& q_centre) {
@@ -75,9 +75,9 @@ struct SelfCollisionStudy::Pair {
   enum class Truth : std::uint8_t { unknown, apart, overlapping };
 
   std::size_t a, b;                     ///< of the links compared
-  const char* given = nullptr;          ///< why it is ignored whatever the solids do
-  std::vector<std::size_t> to_a, to_b;  ///< joints from where their paths part
-  std::vector<std::size_t> free = {};   ///< joints that move one against the other
+  const char* given = nullptr;          ///< reason to ignore it whatever the solids do
+  std::vector<std::size_t> to_a, to_b;  ///< joints from where their paths diverge
+  std::vector<std::size_t> free = {};   ///< joints that move one relative to the other
   std::vector<Truth> truth = {};        ///< by sample
 
   Eigen::Isometry3d b_in_a(const RobotModel& robot, const Positions& positions) const {
@@ -101,7 +101,7 @@ SelfCollisionStudy::SelfCollisionStudy(const RobotModel& robot, std::vector<std:
     links.push_back(index_named(robot.links, name));
     compared[links.back()] = links.size() - 1;
   }
-  // For each link, the compared link that it moves with or hangs from: itself, or the nearest
+  // For each link, the compared link that it moves with or hangs from: itself, or the nearest one
   // above.
   std::vector<std::size_t> holder = compared;
   for (const std::size_t link : robot.order)
@@ -137,7 +137,7 @@ SelfCollisionStudy::SelfCollisionStudy(const RobotModel& robot, std::vector<std:
     }
 }
 
-/// Positions that decide, the notable poses first, then as many that measure.
+/// Draws the positions that decide, the notable poses first, then as many that measure.
 void SelfCollisionStudy::draw_samples(std::span<const LinkSpheres> links) {
   open_grippers(bodies_of(links));
   double tests = 1;
@@ -166,7 +166,7 @@ void SelfCollisionStudy::draw_samples(std::span<const LinkSpheres> links) {
   for (Pair& pair : pairs_) pair.truth.resize(samples_.size());
 }
 
-/// Locks each gripper where its fingers are farthest apart, or where it is asked to be.
+/// Locks each gripper where its fingers are farthest apart, or as requested.
 void SelfCollisionStudy::open_grippers(const std::vector<SphereBody>& bodies) {
   Positions positions = default_positions(robot_);
   for (const std::size_t joint : gripper_joints(robot_)) {
@@ -193,7 +193,7 @@ void SelfCollisionStudy::open_grippers(const std::vector<SphereBody>& bodies) {
   }
 }
 
-/// Draws positions in which no solids overlap until there are kFree, `free` included. `compared`:
+/// Draws positions in which no solids overlap until there are kFree, including `free`. `compared`:
 /// by pair.
 void SelfCollisionStudy::draw_free(const std::vector<SphereBody>& bodies,
                                    const std::vector<std::uint8_t>& compared, std::size_t free) {
@@ -234,8 +234,8 @@ bool SelfCollisionStudy::solids_overlap(Pair& pair, std::size_t sample,
   return truth == Pair::Truth::overlapping;
 }
 
-/// Whether all (`always`) or no positions of the joints between two links that are tried let their
-/// solids overlap; those at limits among them. Counts into `tried`.
+/// Tests whether all (`always`) or none of the sampled positions of the joints between two links
+/// let their solids overlap, including positions at limits. Adds to `tried`.
 bool SelfCollisionStudy::holds(const Pair& pair, bool always, const Apart& apart,
                                std::size_t& tried) const {
   const std::size_t count = kMoreSamples * half_;
@@ -275,7 +275,7 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
   out.locked = locked_;
   out.pairs.resize(pairs_.size());
   std::vector<std::vector<FalseMeeting>> meetings(pairs_.size());
-  const auto opens = [&](const Pair& pair) {  // or closes: no concern of a planner
+  const auto opens = [&](const Pair& pair) {  // opens or closes: irrelevant for a planner
     return std::all_of(pair.free.begin(), pair.free.end(),
                        [&](std::size_t j) { return locked_.contains(j); });
   };
@@ -290,7 +290,7 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
       return;
     }
     std::size_t solids = 0, spheres = 0;
-    told.tried = pair.free.empty() ? 1 : half_;  // one that cannot move is what it is
+    told.tried = pair.free.empty() ? 1 : half_;  // without free joints one position decides
     for (std::size_t k = 0; k < told.tried; ++k) {
       bool by_spheres = false, by_solids = false;
       look(pair, k, by_spheres, by_solids);
@@ -342,7 +342,7 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
       look(pairs_[i], half_ + k, by_spheres, by_solids);
       by_spheres = by_spheres && told.ignored.empty();
       told.colliding += by_solids ? 1 : 0;
-      if (pairs_[i].given != nullptr) continue;  // Excluded: it counts as no collision
+      if (pairs_[i].given != nullptr) continue;  // Excluded: not counted as a collision
       told.missed += by_solids && !by_spheres ? 1 : 0;
       told.falsely += by_spheres && !by_solids ? 1 : 0;
       if (by_spheres) std::atomic_ref(calls[k]).store(1, std::memory_order_relaxed);

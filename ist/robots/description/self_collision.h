@@ -15,27 +15,27 @@
 
 namespace ist {
 
-/// Whether the solids of two links overlap: indices of the links that are compared, and the pose of
-/// b's frame in a's. Called from many threads at once.
+/// True if the solids of two links overlap: indices of the compared links, and the pose of b's
+/// frame in a's. Called from many threads at once.
 using LinksOverlap =
     std::function<bool(std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a)>;
 
-/// Two links, and what is known of them.
+/// Two links, and the results of their comparison.
 struct LinkPair {
   std::string a, b;  ///< in the order of the file
-  /// Why a planner is not to compare their spheres; empty: it is to.
+  /// The reason why a planner should not compare their spheres; empty: it should compare them.
   ///
-  /// Adjacent: a joint connects them, or links without spheres alone stand between. Always: the
+  /// Adjacent: a joint connects them, or only links without spheres are between them. Always: the
   /// solids overlapped in all positions tried. Never: in none, though the spheres did in 1 % or
-  /// more. Excluded: the robot's file or SRDF says so.
+  /// more. Excluded: by the robot's file or SRDF.
   std::string ignored;
   std::size_t tried = 0;  ///< positions of the joints between them that decided it; 0: none did
-  // Among SelfCollision::samples other positions:
+  // In SelfCollision::samples other positions:
   std::size_t colliding = 0;  ///< the solids overlap
   std::size_t missed = 0;     ///< the solids overlap, and no compared spheres of this pair do
   std::size_t falsely = 0;    ///< compared spheres overlap, and the solids do not
 
-  /// Whether `colliding` was counted.
+  /// True if `colliding` was counted.
   bool is_counted() const { return ignored != "Adjacent" && ignored != "Always"; }
 };
 
@@ -61,12 +61,12 @@ struct SelfCollision {
   std::size_t free = 0;                ///< of the positions that decide: no solids overlap
   DefaultPose pose;
   std::map<std::size_t, double> locked;  ///< joints of grippers: open, in the pose and the samples
-  /// Positions of all joints, drawn within their limits after all was decided, and how many of them
-  /// are truly colliding (of pairs that are not Adjacent, Always or Excluded), of these how many
-  /// the spheres call free, and how many free ones they call colliding.
+  /// Positions of all joints, drawn within their limits after all decisions; how many of them are
+  /// truly colliding (of pairs that are not Adjacent, Always or Excluded), how many of these the
+  /// spheres call free, and how many free ones they call colliding.
   std::size_t samples = 0, colliding = 0, missed = 0, falsely = 0;
 
-  /// Whether a compared pair's solids overlap in more than half of the samples.
+  /// True if a compared pair's solids overlap in more than half of the samples.
   bool is_mostly_colliding(const LinkPair& pair) const {
     return pair.ignored.empty() && 2 * pair.colliding > samples;
   }
@@ -84,12 +84,12 @@ struct WantedPose {
   std::vector<std::pair<std::string, Positions>> states = {};  ///< tried first, by name
 };
 
-/// Finds out which links a planner must compare, by solids in sampled positions.
+/// Determines which links a planner must compare, by solids in sampled positions.
 ///
-/// The default pose is the first of these in which neither solids nor spheres overlap: the states
-/// given, joints at 0 (or the middle of limits that exclude it), the middle of all limits, poses
-/// that differ from the first in few joints. Else it is the first in which no solids do; else the
-/// first. The same input gives the same answer.
+/// The default pose is the first of these in which neither solids nor spheres overlap: the given
+/// states, joints at 0 (or the middle of limits that exclude it), the middle of all limits, poses
+/// that differ from the first in few joints. Else it is the first in which no solids overlap; else
+/// the first. Deterministic.
 class SelfCollisionStudy {
  public:
   /// `names`: of the links to compare. Keeps a reference to the robot.
@@ -97,8 +97,8 @@ class SelfCollisionStudy {
                      WantedPose wanted);
   ~SelfCollisionStudy();
 
-  /// `links`: spheres of each of the links, in their order. `cover`: each contains its link. What
-  /// is known of solids is kept from call to call.
+  /// `links`: spheres of each link, in order. `cover`: each set contains its link. Results about
+  /// solids are kept from call to call.
   SelfCollision of(std::span<const LinkSpheres> links, bool cover);
 
  private:
@@ -118,11 +118,11 @@ class SelfCollisionStudy {
   const LinksOverlap overlap_;
   const WantedPose wanted_;
   std::vector<Pair> pairs_;
-  std::map<std::size_t, double> locked_;  ///< joints of grippers, at which position
-  std::vector<std::pair<std::string, Positions>> notable_;  ///< poses to begin with, in order
+  std::map<std::size_t, double> locked_;                    ///< locked positions of gripper joints
+  std::vector<std::pair<std::string, Positions>> notable_;  ///< poses to try first, in order
   std::size_t half_ = 0;                                    ///< of samples_: those that decide
   std::vector<Positions> samples_;
-  std::vector<Positions> free_;  ///< drawn beside them, where no solids overlap
+  std::vector<Positions> free_;  ///< additional positions without overlapping solids
 };
 
 }  // namespace ist

@@ -15,15 +15,15 @@
 namespace ist {
 namespace {
 
-/// The shortest text without an exponent, which some readers of YAML take for a word, that reads
-/// back as the same number.
+/// The shortest text that reads back as the same number, without an exponent, since some readers of
+/// YAML take that for a word.
 std::string number(double x) {
   char text[400];
   const auto end = std::to_chars(text, text + sizeof text, x + 0.0, std::chars_format::fixed).ptr;
   return std::string(text, end);
 }
 
-/// The same, for readers that tell whole numbers and others apart.
+/// The same, for readers that distinguish integers from other numbers.
 std::string real(double x) {
   const std::string text = number(x);
   return text.find('.') == std::string::npos ? text + ".0" : text;
@@ -33,7 +33,7 @@ std::string vector(const Eigen::Vector3d& v, const char* between) {
   return number(v.x()) + between + number(v.y()) + between + number(v.z());
 }
 
-/// A name as a YAML key: plain where that can be no other value, else in quotes.
+/// A name as a YAML key: plain if it is unambiguous, else in quotes.
 std::string yaml_text(std::string_view text) {
   const bool plain =
       text.find('_') != std::string_view::npos &&
@@ -49,7 +49,7 @@ std::string yaml_text(std::string_view text) {
   return out + "\"";
 }
 
-/// A capsule is a cylinder and two spheres: URDF has no capsules.
+/// A capsule as a cylinder and two spheres: URDF has no capsules.
 std::string collisions(const LinkSpheres& link, const std::string& indent) {
   std::string out;
   const auto add = [&](const std::string& name, const Eigen::Vector3d& at, const std::string& rpy,
@@ -68,7 +68,7 @@ std::string collisions(const LinkSpheres& link, const std::string& indent) {
     const std::string name = "_capsule_" + std::to_string(i);
     ball(name + "_begin", begin, radius);
     ball(name + "_end", end, radius);
-    if (!along.isZero(0))  // which takes z to the capsule's axis
+    if (!along.isZero(0))  // rotates z to the capsule's axis
       add(name, (begin + end) / 2,
           "0 " + number(std::atan2(along.head<2>().norm(), along.z())) + " " +
               number(std::atan2(along.y(), along.x())),
@@ -79,7 +79,7 @@ std::string collisions(const LinkSpheres& link, const std::string& indent) {
   return out;
 }
 
-/// The text before a byte on its line, if that is white space alone.
+/// The text before a byte on its line, if that is only white space.
 std::string indent_before(std::string_view text, std::size_t at) {
   std::size_t begin = at;
   while (begin > 0 && (text[begin - 1] == ' ' || text[begin - 1] == '\t')) --begin;
@@ -101,7 +101,7 @@ std::string yaml_list(const std::vector<std::string>& items) {
   return "[" + out + "]";
 }
 
-/// "self_collision_ignore:" and what to ignore of each link; all of it once.
+/// "self_collision_ignore:" and the links that each link ignores, each pair once.
 void append_ignored(const SelfCollision& self, const std::string& key, const std::string& indent,
                     std::string& out) {
   std::map<std::string, std::vector<std::string>> ignored;
@@ -112,15 +112,15 @@ void append_ignored(const SelfCollision& self, const std::string& key, const std
     out += indent + "  " + yaml_text(link) + ": " + yaml_list(others) + "\n";
 }
 
-/// Spheres are compared as they are: smaller ones would miss collisions of the link with all
-/// others.
+/// Buffers of 0: spheres are compared unchanged, since smaller ones would miss collisions of the
+/// link with all others.
 void append_buffers(std::span<const LinkSpheres> links, const std::string& key,
                     const std::string& indent, std::string& out) {
   out += indent + key + ":\n";
   for (const LinkSpheres& link : links) out += indent + "  " + yaml_text(link.link) + ": 0.0\n";
 }
 
-// Values that a URDF does not state, as in cuRobo's own robots.
+// Values that a URDF does not contain, as in cuRobo's own robots.
 constexpr double kAcceleration = 15;  // [rad/s², u/s²]
 constexpr double kJerk = 500;         // [rad/s³, u/s³]
 
@@ -181,7 +181,7 @@ std::string urdf_with_spheres(const RobotModel& robot, std::span<const LinkSpher
     for (const auto& [begin, end] : link.collision_bytes) {
       const std::string indent = indent_before(bytes, begin);
       std::size_t first = begin;
-      if (written) {  // an empty line is not left behind
+      if (written) {  // no empty line is left
         first -= indent.size();
         if (bytes[first - 1] == '\n') --first;
       }
@@ -189,7 +189,7 @@ std::string urdf_with_spheres(const RobotModel& robot, std::span<const LinkSpher
       written = true;
     }
     if (written) continue;
-    // Spheres of visual shapes: the link had no collision.
+    // The spheres replace visual shapes: the link had no collision.
     const std::size_t at = bytes.rfind("</", link.end);
     edits.push_back({at, at, "  " + collisions(*found, "    ") + "\n  "});
   }

@@ -8,8 +8,8 @@
 
 #include "robots/description/robot_model.h"
 
-// Files in which other tools expect a robot's spheres. Numbers have all their digits: they come
-// back as they were.
+// Files of a robot's spheres for other tools. Numbers have all their digits, so they read back
+// exactly.
 
 namespace ist {
 
@@ -17,27 +17,27 @@ namespace ist {
 struct LinkSpheres {
   std::string link;
   std::vector<CoverSphere> spheres;
-  double protrusion = 0;                    ///< [u] none reaches further out of the link
-  std::vector<CoverCapsule> capsules = {};  ///< beside the spheres; URDF alone has them
+  double protrusion = 0;                    ///< [u] bound on the protrusion
+  std::vector<CoverCapsule> capsules = {};  ///< in addition to the spheres; only URDF supports them
 };
 
 struct SelfCollision;
 
-/// The URDF with every collision of these links replaced by spheres; all else is kept, byte for
-/// byte, but for relative names of meshes, so that they are found from `folder`, where it will lie
-/// ("": beside the robot's file).
+/// The URDF with every collision of these links replaced by spheres; everything else is kept, byte
+/// for byte, except relative names of meshes, which are rewritten relative to `folder`, the new
+/// file's place ("": beside the robot's file).
 std::string urdf_with_spheres(const RobotModel& robot, std::span<const LinkSpheres> links,
                               const std::string& folder = "");
 
-/// A URDF of one link that is spheres, for a mesh that belongs to no robot.
+/// A URDF of a single link made of spheres, for a mesh without a robot.
 std::string urdf_of_spheres(const LinkSpheres& link);
 
-/// cuRobo: collision_spheres alone, a list of center and radius a link, for a mesh that belongs to
-/// no robot.
+/// cuRobo: collision_spheres alone, a list of center and radius for each link, for a mesh without a
+/// robot.
 std::string curobo_spheres(std::span<const LinkSpheres> links);
 
-/// cuRobo 0.8: a whole robot_cfg. `urdf`: the robot's file, seen from where this one will lie.
-/// Joints of fingers are locked where the default pose has them.
+/// cuRobo 0.8: a whole robot_cfg. `urdf`: the path of the robot's file from this file. Joints of
+/// fingers are locked in the default pose.
 std::string curobo_robot(const RobotModel& robot, const std::string& urdf,
                          std::span<const LinkSpheres> links, const SelfCollision& self);
 
@@ -46,7 +46,7 @@ std::string curobo_robot(const RobotModel& robot, const std::string& urdf,
 std::string xrdf(const RobotModel& robot, std::span<const LinkSpheres> links,
                  const SelfCollision& self);
 
-/// MoveIt: an SRDF with a link_sphere_approximation a link, and disable_collisions.
+/// MoveIt: an SRDF with one link_sphere_approximation per link, and disable_collisions.
 std::string srdf(const RobotModel& robot, std::span<const LinkSpheres> links,
                  const SelfCollision& self);
 

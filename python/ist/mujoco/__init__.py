@@ -52,7 +52,7 @@ def load() -> str:
                           f"Install it: pip install 'mujoco=={VERSION}.*'")
     if not os.path.exists(path):
         raise ImportError("this build of ist has no plug-in for MuJoCo: see docs/mujoco.md")
-    # The plug-in finds MuJoCo's functions by name: it names no version of the library.
+    # The plug-in finds MuJoCo's functions by name: it does not depend on the library's version.
     library = pathlib.Path(mujoco.__file__).with_name(f"libmujoco.so.{mujoco.__version__}")
     ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
     mujoco.mj_loadPluginLibrary(path)
@@ -135,7 +135,7 @@ def attach(spec: mujoco.MjSpec, geoms: collections.abc.Iterable[str] | None = No
     for flex in spec.flexes:
         if chosen and flex.dim != 2 and (flex.contype or flex.conaffinity):
             _warn(f"flex {flex.name!r} does not meet solids: MuJoCo collides only flexes of dim 2 with geoms of type sdf")
-    # Nothing is changed until here.
+    # Nothing has been changed before this line.
     chosen = [geom for geom in chosen if solids[int(model.geom_dataid[geom.id])] is not None]
     _masses.set_bodies(spec, model, {geom.id: solids[int(model.geom_dataid[geom.id])] for geom in chosen})
     instances: dict[int, str] = {}
@@ -184,7 +184,7 @@ def _meet_terrains(spec, solids):
                 pair.geomname1, pair.geomname2 = named(terrain, "ist terrain"), hull.name
             if not paired:
                 first = max((solid, terrain), key=lambda geom: (geom.priority, geom.condim))
-                undefined = float("nan")  # MuJoCo mixes what the two geoms have
+                undefined = float("nan")  # MuJoCo mixes the values of the two geoms
                 spec.add_pair(geomname1=named(terrain, "ist terrain"), geomname2=hull.name, condim=first.condim,
                               friction=[undefined] * 5, solref=[undefined] * 2, solimp=[undefined] * 5,
                               margin=undefined, gap=undefined)

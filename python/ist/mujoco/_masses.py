@@ -23,7 +23,7 @@ def set_bodies(spec, model, solids):
         return
     rest = _without(spec, list(geoms))
     if rest.nbody != model.nbody or rest.ngeom != model.ngeom:
-        return  # bodies are fused: their masses are MuJoCo's
+        return  # bodies are fused: MuJoCo computes their masses
     for number, numbers in chosen.items():
         parts = [(rest.body_mass[number], rest.body_ipos[number],
                   _turned(rest.body_iquat[number], np.diag(rest.body_inertia[number])))]
@@ -42,7 +42,7 @@ def _without(spec, numbers):
     for body in copy.bodies:
         body.compiler.boundmass = body.compiler.boundinertia = 1e-14  # MuJoCo refuses bodies without
         if body.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
-            # MuJoCo takes what the file states where no geom has a mass.
+            # MuJoCo uses the file's values if no geom has a mass.
             body.mass, body.inertia, body.fullinertia = 0, [0] * 3, [np.nan] * 6
     for geom in copy.geoms:
         if geom.id in numbers:
@@ -72,7 +72,7 @@ def _turned(quat, inertia):
 def _give(body, parts):
     mass = sum(part[0] for part in parts)
     if not mass > 1e-12:
-        return  # massless, which MuJoCo judges
+        return  # massless bodies are left to MuJoCo's checks
     centre = sum(part[0] * part[1] for part in parts) / mass
     whole = np.zeros((3, 3))
     for part, place, inertia in parts:

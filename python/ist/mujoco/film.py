@@ -32,7 +32,7 @@ class Film:
         times = self._put(np.asarray(self._times, np.float32), "SCALAR")
         places = np.asarray(self._places, np.float32)
         turns = np.roll(np.asarray(self._turns, np.float32), -1, axis=2)  # x, y, z, w
-        flips = np.sign((turns[1:] * turns[:-1]).sum(2))  # the shorter way from picture to picture
+        flips = np.sign((turns[1:] * turns[:-1]).sum(2))  # the shorter rotation from picture to picture
         turns[1:] *= np.cumprod(np.where(flips == 0, 1, flips), axis=0)[..., None]
         meshes, nodes, channels, samplers, materials, made = [], [], [], [], [], {}
         for geom in range(self._model.ngeom):

@@ -7,7 +7,7 @@
 
 namespace ist {
 
-/// Border vertices in a k-d tree: the middle one of a range parts it, along x, y and z in turn.
+/// Border vertices in a k-d tree: the median of a range divides it, along x, y and z in turn.
 class BorderVertices {
  public:
   BorderVertices(const TriangleMesh& mesh, const std::vector<bool>& border) : mesh_(mesh) {
@@ -16,7 +16,8 @@ class BorderVertices {
     part(0, points_.size(), 0);
   }
 
-  /// Those within `tolerance` of the segment from u to v but not of its ends, in its order.
+  /// The vertices within `tolerance` of the segment from u to v, except near its ends, in order
+  /// along it.
   std::vector<std::uint32_t> on_segment(std::uint32_t u, std::uint32_t v, double tolerance) const {
     std::vector<std::pair<double, std::uint32_t>> found;
     for_each_beside(u, v, tolerance, [&](std::uint32_t w, double off, double at, double from_end) {
@@ -29,8 +30,8 @@ class BorderVertices {
     return result;
   }
 
-  /// The least tolerance up to `most` by which a vertex lies on the segment or is one with its
-  /// ends; infinity where there is none.
+  /// The least tolerance up to `most` within which a vertex lies on the segment or coincides with
+  /// its ends; infinity if there is none.
   double least_tolerance(std::uint32_t u, std::uint32_t v, double most) const {
     double least = HUGE_VAL;
     for_each_beside(u, v, most, [&](std::uint32_t w, double off, double, double from_end) {
@@ -46,14 +47,14 @@ class BorderVertices {
     std::uint32_t vertex;
   };
 
-  static constexpr std::size_t kFew = 8;  ///< are not parted
+  static constexpr std::size_t kFew = 8;  ///< so few are not divided
 
   double distance(std::uint32_t v, std::uint32_t w) const {
     return (mesh_.vertices[v] - mesh_.vertices[w]).norm();
   }
 
-  /// visit(w, its distance from the line, its place along it from u, that from the nearer end) for
-  /// all that lie within `tolerance` of the segment from u to v, and some others.
+  /// visit(w, its distance from the line, its position along it from u, that from the nearer end)
+  /// for all vertices within `tolerance` of the segment from u to v, and some others.
   template <class Visit>
   void for_each_beside(std::uint32_t u, std::uint32_t v, double tolerance,
                        const Visit& visit) const {
@@ -79,7 +80,7 @@ class BorderVertices {
     part(middle + 1, last, (axis + 1) % 3);
   }
 
-  /// A range of the tree, and the part of a line that is looked at there.
+  /// A range of the tree, and the part of a line that is searched there.
   struct Range {
     std::size_t first, last;
     int axis;
@@ -98,15 +99,15 @@ class BorderVertices {
     const std::size_t middle = first + (last - first) / 2;
     const double plane = points_[middle].x[axis], slope = along[axis];
     const double from = a[axis] + slope * begin - plane, to = a[axis] + slope * end - plane;
-    const double room = 2 * tolerance;
-    const bool below = std::min(from, to) <= room, above = std::max(from, to) >= -room;
+    const double margin = 2 * tolerance;
+    const bool below = std::min(from, to) <= margin, above = std::max(from, to) >= -margin;
     Range parts[] = {{first, middle, (axis + 1) % 3, begin, end},
                      {middle + 1, last, (axis + 1) % 3, begin, end}};
     if (below && above) {
       visit(points_[middle]);
-      // Where the line leaves the one side and enters the other.
+      // The line leaves one side and enters the other.
       for (const int side : {0, 1}) {
-        const double off = (side == 0 ? room : -room) - from;
+        const double off = (side == 0 ? margin : -margin) - from;
         if (!(std::abs(off) < std::abs(to - from))) continue;
         const double place = begin + off / (to - from) * (end - begin);
         if ((to > from) == (side == 0))

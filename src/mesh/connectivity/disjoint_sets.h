@@ -10,7 +10,7 @@
 namespace ist {
 
 /// Union–find whose representatives are the smallest members. unite() and find() may be called from
-/// many threads at once and end with the representatives of one thread.
+/// many threads at once; the result is that of a single thread.
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t size)
@@ -22,7 +22,7 @@ class DisjointSets {
   std::uint32_t find(std::uint32_t i) {
     for (std::uint32_t above = parent(i).load(std::memory_order_relaxed); above != i;) {
       const std::uint32_t next = parent(above).load(std::memory_order_relaxed);
-      // Path halving. A parent only ever gets a smaller index, within the same set.
+      // Path halving. A parent's index only decreases, within the same set.
       if (next != above) parent(i).compare_exchange_weak(above, next, std::memory_order_relaxed);
       i = above = next;
       above = parent(i).load(std::memory_order_relaxed);

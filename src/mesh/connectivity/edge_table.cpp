@@ -11,13 +11,13 @@
 namespace ist {
 namespace {
 
-/// A side at its smaller vertex: the larger one, and the side below it.
+/// A side stored at its smaller vertex: the larger vertex, and below it the side.
 using Entry = std::uint64_t;
 
 std::uint32_t high_of(const Entry entry) { return static_cast<std::uint32_t>(entry >> 32); }
 std::uint32_t side_of(const Entry entry) { return static_cast<std::uint32_t>(entry); }
 
-/// One more than the largest index; 0 where there are no triangles.
+/// The largest index plus one; 0 without triangles.
 std::uint32_t vertex_count(std::span<const Triangle> triangles) {
   return tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, triangles.size()), std::uint32_t{0},

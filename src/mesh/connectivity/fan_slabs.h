@@ -12,28 +12,29 @@ namespace ist {
 
 using FloatPoint = std::array<float, 3>;
 
-/// Bounds the triangles under a node where there are large fans or other needles: their triangles
-/// are long and thin, and their boxes overlap nearly all others'.
+/// Bounds the triangles under a node if there are large fans or other needles: their triangles are
+/// long and thin, and their boxes overlap nearly all others.
 struct Slab {
-  std::uint32_t owner = kNoIndex;  ///< the vertex of many triangles that all of them have
-  bool spread = false;             ///< its fan is spread: none of them meet
-  Eigen::Vector3d direction;       ///< the middle of a cone from the owner around them
-  double angle = 0;                ///< [rad] and half its opening
+  std::uint32_t owner = kNoIndex;  ///< the vertex shared by all triangles, if it has many
+  bool spread = false;             ///< its fan is spread: no two of its triangles meet
+  Eigen::Vector3d direction;       ///< the axis of a cone from the owner around them
+  double angle = 0;                ///< [rad] half the opening of the cone
   Eigen::Vector3d centre;          ///< of a box around them
   Eigen::Matrix3d axes;            ///< its axes, in columns
-  Eigen::Vector3d half;            ///< and half its sizes
+  Eigen::Vector3d half;            ///< and half extents
 
-  /// Seen from the vertex that all have they lie in different directions, or are known not to meet.
+  /// True if the groups lie in different directions from their common vertex, or are known not to
+  /// meet.
   bool apart_about_owner(const Slab& other) const {
     if (owner != other.owner || owner == kNoIndex) return false;
-    constexpr double kRounding = 2.5e-4;  // of directions to points that are rounded to float
+    constexpr double kRounding = 2.5e-4;  // of directions to points rounded to float
     return spread || angle_of(direction.cross(other.direction).norm(),
                               direction.dot(other.direction)) > angle + other.angle + kRounding;
   }
 
-  /// A plane along a side of either box, or along an edge of both, has them on different sides.
+  /// True if a plane along a side of either box, or along an edge of both, separates them.
   bool apart_from(const Slab& other) const {
-    constexpr double kRounding = 1e-6;  // of coordinates within [0, 1], rounded to float, and more
+    constexpr double kRounding = 1e-6;  // exceeds that of coordinates within [0, 1] in float
     const Eigen::Vector3d between = other.centre - centre;
     const Eigen::Vector3d off = axes.transpose() * between;
     const Eigen::Matrix3d turn = axes.transpose() * other.axes, size = turn.cwiseAbs();
@@ -54,15 +55,15 @@ struct Slab {
   }
 };
 
-/// The corners of up to eight triangles, and two planes that have all of them behind: of their
-/// planes those that most nearly bound them. Needles side by side, as the walls of a star, lie
-/// between such planes like the slice of a cake, and boxes of slices meet near the tip.
+/// The corners of up to eight triangles, and two of their planes that have all of them behind:
+/// those that bound them most tightly. Adjacent needles, like the walls of a star, lie between such
+/// planes like a slice of a cake, while boxes of slices meet near the tip.
 struct Slice {
   static constexpr std::size_t kCorners = 24;
   float corner[3][kCorners];  ///< in [0, 1]
   float normal[2][3], reach[2];
 
-  /// One of either's planes has the other before it.
+  /// True if one of either's planes has the other in front of it.
   bool apart_from(const Slice& other) const { return other.is_before(*this) || is_before(other); }
 
  private:
@@ -79,16 +80,16 @@ struct Slice {
   }
 };
 
-/// [triangle] The corner with the most triangles, if these are many; nothing at all if none has.
+/// [triangle] The corner with the most triangles, if these are many; empty if no corner has many.
 std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles, std::size_t vertices);
 
-/// A box around a group of triangles, one of whose axes is along their longest side, one along
-/// their normal. `points`: vertices, in [0, 1]. `margin`: by which one of two boxes is wider.
+/// A box around a group of triangles, with one axis along their longest side and one along their
+/// normal. `points`: vertices, in [0, 1]. `margin`: by which one of two boxes is enlarged.
 Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
              std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners,
              const std::vector<std::uint32_t>& spread, double margin);
 
-/// `group`: one to eight triangles. Planes lie further out by `margin`.
+/// `group`: one to eight triangles. Planes are moved out by `margin`.
 Slice slice_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
                std::span<const std::uint32_t> group, double margin);
 

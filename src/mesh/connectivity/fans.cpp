@@ -19,7 +19,7 @@ struct Fan {
   std::vector<exact_sign::BoundedCross> faces;
 };
 
-/// The sides opposite to a vertex, one after the other. False: they are no closed ring.
+/// Finds the sides opposite to a vertex as a ring. False if they do not form one closed ring.
 bool find_ring(std::uint32_t v, std::span<const std::uint32_t> triangles_at,
                const std::vector<Triangle>& triangles, Fan& fan) {
   fan.sides.clear();
@@ -58,8 +58,8 @@ bool is_spread(std::uint32_t v, const std::vector<Eigen::Vector3d>& vertices, Fa
   viewer /= length;
   for (std::size_t i = 0; i < count; ++i)
     if (faces[i].side_of(viewer.data()) <= 0) return false;
-  // Each spoke is less than half a turn on from the one before. They go around once if they are
-  // left of the first spoke, then perhaps one opposite to it, then right of it.
+  // Each spoke is less than half a turn after the one before. They go around once if they are first
+  // left of the first spoke, then perhaps one is opposite to it, then right of it.
   int last = 1;
   for (std::size_t i = 2; i + 1 < count; ++i) {
     const exact_sign::BoundedCross plane(spokes[0].data(), spokes[i].data());
@@ -72,7 +72,8 @@ bool is_spread(std::uint32_t v, const std::vector<Eigen::Vector3d>& vertices, Fa
 
 constexpr double kFullCone = 4;  ///< [rad] no angle is larger
 
-/// A cone from the owner around what else the group has: less than half of all directions, or all.
+/// Adds a cone from the owner around the group's other corners: less than half of all directions,
+/// or all.
 void add_cone(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
               std::span<const std::uint32_t> group, Slab& slab) {
   const auto for_each_direction = [&](const auto& visit) {
@@ -84,7 +85,7 @@ void add_cone(const RawArray<FloatPoint>& points, const std::vector<Triangle>& t
         const Eigen::Vector3d off(double{p[0]} - double{o[0]}, double{p[1]} - double{o[1]},
                                   double{p[2]} - double{o[2]});
         const double length = off.norm();
-        constexpr double kShort = 1e-3;  // else rounding to float turns it too far
+        constexpr double kShort = 1e-3;  // shorter vectors lose their direction in float
         visit(length > kShort ? Eigen::Vector3d(off / length) : Eigen::Vector3d::Zero());
       }
   };
@@ -185,7 +186,7 @@ Slice slice_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& 
     }
   struct Plane {
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-    double reach = HUGE_VAL, beyond = HUGE_VAL;  ///< of the group; past the triangle
+    double reach = HUGE_VAL, beyond = HUGE_VAL;  ///< of the group; beyond the triangle
   };
   std::vector<Plane> planes;
   for (Eigen::Index t = 0; t < Eigen::Index(group.size()); ++t) {

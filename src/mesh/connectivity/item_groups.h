@@ -13,11 +13,11 @@
 
 namespace ist {
 
-/// Items by their groups. Offset: counts all items.
+/// Items grouped by a number. Offset must be able to count all items.
 template <class Offset = std::uint32_t, class Item = std::uint32_t>
 struct ItemGroups {
-  std::vector<Offset> first;  ///< of each group's items, and of none behind them
-  RawArray<Item> items;       ///< those of a group in the order in which they came
+  std::vector<Offset> first;  ///< index of each group's first item, and the end of the last
+  RawArray<Item> items;       ///< each group in order of insertion
 
   ItemGroups() = default;
   /// `each(visit)` calls visit(group, item) for all items; it is called twice.
@@ -25,7 +25,7 @@ struct ItemGroups {
   ItemGroups(std::size_t groups, const Each& each)
       : ItemGroups(groups, each, [](Offset& count) { return count++; }) {}
 
-  /// The same where `each` visits from many threads: the items of a group are sorted.
+  /// The same if `each` calls visit from many threads; each group is sorted.
   template <class Each, class Before = std::less<>>
   static ItemGroups in_parallel(std::size_t groups, const Each& each, const Before& before = {}) {
     ItemGroups made(groups, each, [](Offset& count) {

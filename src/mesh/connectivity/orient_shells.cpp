@@ -15,14 +15,14 @@
 namespace ist {
 namespace {
 
-/// Which side of the edge from u to v the point lies on, seen in the yz plane: the same answer,
-/// bit for bit, whichever of its triangles asks. On the edge counts as left.
+/// True if the point is left of the edge from u to v in the yz plane. Gives the same bits for both
+/// triangles at the edge. A point on the edge counts as left.
 bool left_of_upward_edge(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
                          const Eigen::Vector3d& p) {
   return orient2d_sign(lower.data() + 1, upper.data() + 1, p.data() + 1) >= 0;
 }
 
-/// Turns of the triangle's outline around the point in the yz plane: −1, 0 or 1.
+/// Winding number of the triangle's outline around the point in the yz plane: −1, 0 or 1.
 int turns_around(const std::array<Eigen::Vector3d, 3>& corners, const Eigen::Vector3d& p) {
   int turns = 0;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -48,7 +48,7 @@ class LineWinding {
         columns_(triangles, 0, [&](std::uint32_t v) { return vertices[v]; }) {}
 
   /// Sets numbers[s] to the winding number of shell s around p, for every shell in `shells_met`,
-  /// which lists those where it may differ from 0. `numbers` must come in as zeros.
+  /// which lists those where it may differ from 0. `numbers` must be zeros on entry.
   void around(const Eigen::Vector3d& p, std::vector<int>& numbers,
               std::vector<std::uint32_t>& shells_met) const {
     shells_met.clear();
@@ -58,7 +58,7 @@ class LineWinding {
                                                    vertices_[t[2]]};
       const int turns = turns_around(corners, p);
       if (turns == 0) continue;
-      // Beyond p in the direction of +x? Then p lies behind a triangle that faces that way.
+      // The triangle is beyond p towards +x if p lies behind it while it faces that direction.
       if (orient3d_sign(corners[0].data(), corners[1].data(), corners[2].data(), p.data()) != turns)
         continue;
       const std::uint32_t shell = shells_.of_triangle[i];
@@ -78,11 +78,12 @@ class LineWinding {
 struct Shell {
   SignedVolume volume;
   Eigen::AlignedBox3d box;
-  std::vector<std::uint32_t> probes;                           ///< some of its vertices
-  std::vector<std::pair<std::uint32_t, int>> containers = {};  ///< shell, its winding number here
+  std::vector<std::uint32_t> probes;  ///< some of its vertices
+  std::vector<std::pair<std::uint32_t, int>> containers =
+      {};  ///< shell, and its winding number here
 };
 
-/// A range of triangles at a time: those of one shell mostly follow one another.
+/// Processes a range of triangles at a time, as those of one shell are mostly consecutive.
 void find_boxes(const std::vector<Eigen::Vector3d>& vertices,
                 const std::vector<Triangle>& triangles, const Shells& shells,
                 std::vector<Shell>& result) {
@@ -131,7 +132,7 @@ std::vector<Shell> measure(const std::vector<Eigen::Vector3d>& vertices,
   return result;
 }
 
-/// Fills in which shells contain which: all probes of the inner one lie inside.
+/// Finds which shells contain which: all probes of the inner one lie inside.
 void find_containers(const std::vector<Eigen::Vector3d>& vertices,
                      const std::vector<Triangle>& triangles, const Shells& shells,
                      std::vector<Shell>& measured) {
@@ -162,7 +163,7 @@ Nesting orient_shells(const std::vector<Eigen::Vector3d>& vertices,
   std::vector<Shell> measured = measure(vertices, triangles, shells);
   if (shells.count > 1) find_containers(vertices, triangles, shells, measured);
 
-  // From the outside in: a shell lies in more shells than those that contain it.
+  // From the outside in: a shell lies in more shells than any that contains it.
   std::vector<std::uint32_t> order(shells.count);
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
@@ -177,7 +178,8 @@ Nesting orient_shells(const std::vector<Eigen::Vector3d>& vertices,
       continue;
     }
     std::uint32_t outermost = s;
-    int around = 0;  // winding number of the shells that contain this one, as they are turned now
+    int around =
+        0;  // winding number of the shells that contain this one, in their current orientation
     for (const auto& [holder, number] : shell.containers) {
       around += turned[holder] ? -number : number;
       if (measured[holder].containers.size() < measured[outermost].containers.size())

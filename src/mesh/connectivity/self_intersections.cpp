@@ -18,10 +18,10 @@
 namespace ist {
 namespace {
 
-/// Eight boxes side by side. A box that is not there is empty: lower = ∞, upper = −∞.
+/// Eight boxes side by side. An unused box is empty: lower = ∞, upper = −∞.
 struct alignas(64) EightBoxes {
   static constexpr std::size_t kWidth = 8;
-  EightBoxes() {}  // left as they are, for threads to fill
+  EightBoxes() {}  // uninitialised, for threads to fill
   float lower[3][kWidth], upper[3][kWidth];
 
   /// Bit k: box k meets box `lane` of `other`.
@@ -32,7 +32,7 @@ struct alignas(64) EightBoxes {
       low[i] = other.lower[i][lane];
       high[i] = other.upper[i][lane];
     }
-    int met = 0;  // in a form that compilers make vector code of
+    int met = 0;  // in a form that compilers vectorise
     for (std::size_t k = 0; k < kWidth; ++k)
       met |= (lower[0][k] <= high[0] ? kBit[k] : 0) & (upper[0][k] >= low[0] ? kBit[k] : 0) &
              (lower[1][k] <= high[1] ? kBit[k] : 0) & (upper[1][k] >= low[1] ? kBit[k] : 0) &
@@ -41,37 +41,37 @@ struct alignas(64) EightBoxes {
   }
 };
 
-/// Triangles along a space-filling curve, and boxes around each of them, around 8, 64, 512 … of
+/// Triangles along a space-filling curve, with boxes around each of them and around 8, 64, 512 … of
 /// them. Degenerate triangles are left out. Coordinates are moved to the bounds' corner, divided by
-/// their width and rounded to float, all of which keeps their order: boxes that meet still do.
+/// their width and rounded to float. This keeps their order, so boxes that meet still do.
 class TriangleBoxes {
  public:
-  /// On the caller's TBB threads. At most 2^21 triangles. `spread`: as spread_fans() has it, or
-  /// nothing where pairs are asked for that do not meet; the triangles of a large fan stand
-  /// together, and pairs of them are not visited where whole nodes are known not to meet.
-  /// `margin`: [u] boxes no further apart meet. `oriented`: nodes have boxes along their triangles
-  /// in any case, not only where there are large fans or needles.
+  /// Runs on the caller's TBB threads. At most 2^21 triangles. `spread`: the result of
+  /// spread_fans(), or empty if the search is for pairs that do not meet. The triangles of a large
+  /// fan are consecutive, and their pairs are skipped if whole nodes are known not to meet.
+  /// `margin`: [u] boxes no further apart meet. `oriented`: nodes always have boxes along their
+  /// triangles, not only for large fans or needles.
   TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
                 const std::vector<Triangle>& triangles,
                 const std::vector<std::uint32_t>& spread = {}, double margin = 0,
                 bool oriented = false);
 
-  /// Pairs of two triangles that are marked need not be visited. [triangle]
+  /// Pairs of two marked triangles need not be visited. [triangle]
   void leave_out(const std::vector<std::uint8_t>& marked);
 
   std::size_t size() const { return order_.size(); }
   bool oriented() const { return !slabs_.empty(); }
-  /// The triangle at a place of the curve.
+  /// The triangle at a position on the curve.
   std::uint32_t triangle(std::size_t place) const { return order_[place]; }
 
-  /// Into how many parts the search for pairs falls.
+  /// The number of parts of the search for pairs.
   std::size_t parts() const { return levels_[start_].size(); }
 
-  /// Calls visit(i, j), i < j, for every two places whose boxes meet and that belong to one part of
-  /// the search, until visit.done() is true.
+  /// Calls visit(i, j), i < j, for every two positions whose boxes meet and that belong to one part
+  /// of the search, until visit.done() is true.
   template <class Visit>
   void for_each_pair(std::size_t part, Visit& visit) const {
-    // A node of the starting level against itself and those behind it.
+    // A node of the starting level against itself and those after it.
     within(start_, part, visit);
     if (start_ + 1 == levels_.size()) return;
     const std::vector<EightBoxes>& above = levels_[start_ + 1];
@@ -84,7 +84,7 @@ class TriangleBoxes {
   }
 
  private:
-  /// Bit k: whether pairs of node `a` of the level below and box k of a node are to be visited.
+  /// Bit k: pairs of node `a` of the level below and box k of a node are to be visited.
   unsigned wanted(std::size_t level, std::size_t a, std::size_t node) const {
     if (wanted_.empty() || (wanted_[level][a / 8] >> a % 8 & 1) != 0) return ~0u;
     return wanted_[level][node];
@@ -103,7 +103,7 @@ class TriangleBoxes {
     }
   }
 
-  /// All pairs of a triangle under node a with one under node b, both of a level, a < b.
+  /// Visits all pairs of a triangle under node a and one under node b, both of one level, a < b.
   template <class Visit>
   void between(std::size_t level, std::size_t a, std::size_t b, Visit& visit) const {
     if (visit.done()) return;
@@ -120,7 +120,7 @@ class TriangleBoxes {
     }
   }
 
-  /// Children of a level's nodes.
+  /// Visits pairs of children of a level's nodes.
   template <class Visit>
   void pair(std::size_t level, std::size_t a, std::size_t b, Visit& visit) const {
     if (level == 0)
@@ -135,7 +135,7 @@ class TriangleBoxes {
   /// One for each node up to the starting level if there are large fans or needles, else empty.
   std::vector<std::vector<Slab>> slabs_;
   std::vector<Slice> slices_;  ///< of level 0, with slabs
-  /// [level][node] Bit k: box k contains a triangle that is not marked. Or none at all.
+  /// [level][node] Bit k: box k contains an unmarked triangle. Empty if nothing is marked.
   std::vector<std::vector<std::uint8_t>> wanted_;
 };
 
@@ -143,7 +143,7 @@ constexpr std::uint64_t kLeftOut = UINT64_MAX;
 constexpr int kIndexBits = 21;
 constexpr float kCells = 1 << 14;  ///< of the curve, along each axis
 
-/// In [0, 1], with the order along each axis kept.
+/// Maps vertices to [0, 1], keeping the order along each axis.
 RawArray<FloatPoint> placed(const std::vector<Eigen::Vector3d>& vertices) {
   const Eigen::AlignedBox3d bounds = bounds_of(vertices);
   const Eigen::Vector3d corner = bounds.min();
@@ -157,7 +157,7 @@ RawArray<FloatPoint> placed(const std::vector<Eigen::Vector3d>& vertices) {
   return points;
 }
 
-/// Where a triangle's middle lies along the curve.
+/// The position of a triangle's middle on the curve.
 std::uint64_t key_of(const RawArray<FloatPoint>& points, const Triangle& t) {
   std::uint64_t key = 0;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -177,7 +177,7 @@ EightBoxes no_boxes() {
   return boxes;
 }
 
-/// Blocks of eight: box_of(i, k) gives the lower and the upper bound of box i along axis k.
+/// Makes blocks of eight: box_of(i, k) gives the lower and the upper bound of box i along axis k.
 template <class BoxOf>
 std::vector<EightBoxes> in_eights(std::size_t count, const BoxOf& box_of) {
   std::vector<EightBoxes> blocks((count + 7) / 8);
@@ -273,7 +273,7 @@ void TriangleBoxes::leave_out(const std::vector<std::uint8_t>& marked) {
   }
 }
 
-/// Whether the exact boxes of two triangles meet.
+/// True if the exact boxes of two triangles meet.
 bool boxes_meet(const std::vector<Eigen::Vector3d>& vertices, const Triangle& a,
                 const Triangle& b) {
   const auto range = [&](const Triangle& t, int k) {
@@ -308,7 +308,7 @@ bool share_corner(const Triangle& a, const Triangle& b) {
 
 constexpr std::size_t kMostTriangles = 2'000'000, kMostPairs = 10'000'000;
 
-/// The boxes of needles meet those of many others.
+/// A limit of candidates: the boxes of needles meet those of many others.
 constexpr std::size_t most_candidates(std::size_t triangles) {
   return std::max(std::size_t{100'000'000}, 1000 * triangles);
 }
@@ -320,7 +320,6 @@ struct Sums {
 
 enum class Look { apart, candidates, met };
 
-/// Looks at the candidates of one part.
 template <class LookAt>
 class Visitor {
  public:
@@ -353,7 +352,7 @@ class Visitor {
   std::size_t candidates_ = 0;  ///< not yet in the sum
 };
 
-/// `look_at`: at the triangles of two places.
+/// Calls look_at for the triangles at two positions.
 template <class LookAt>
 std::optional<SelfIntersections> search(const TriangleBoxes& boxes, const LookAt& look_at) {
   Sums sums;
@@ -372,7 +371,7 @@ std::optional<SelfIntersections> search(const TriangleBoxes& boxes, const LookAt
   return result;
 }
 
-/// Triangles whose boxes meet the box around those that are not known to be apart from others.
+/// The triangles whose boxes meet the box around those that are not known to be apart from others.
 std::vector<std::uint32_t> near_others(const std::vector<Eigen::Vector3d>& vertices,
                                        const std::vector<Triangle>& triangles,
                                        const std::vector<std::uint8_t>& known_apart) {

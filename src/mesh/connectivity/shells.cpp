@@ -35,8 +35,8 @@ DisjointSets connected_pieces(const EdgeTable& edges, std::size_t most) {
 
 namespace {
 
-/// Angle of p about the axis through `origin`, from 0 at `zero`, as a monotone stand-in in [0, 4):
-/// the perimeter of a diamond instead of a circle.
+/// A monotone substitute in [0, 4) for the angle of p about the axis through `origin`, from 0 at
+/// `zero`: the perimeter of a diamond instead of a circle.
 double diamond_angle(const Eigen::Vector3d& p, const Eigen::Vector3d& origin,
                      const Eigen::Vector3d& axis, const Eigen::Vector3d& zero) {
   const Eigen::Vector3d right = (zero - origin) - axis * (axis.dot(zero - origin));
@@ -47,7 +47,7 @@ double diamond_angle(const Eigen::Vector3d& p, const Eigen::Vector3d& origin,
   return x < 0 ? 2 - y / sum : 3 + x / sum;
 }
 
-/// Sides of an edge in the order of their angle about it.
+/// The sides at an edge, sorted by their angle about it.
 std::vector<std::pair<double, std::uint32_t>> around_edge(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
     const EdgeTable& edges, std::size_t edge) {
@@ -79,7 +79,7 @@ SidePartners all_partners(const std::vector<Eigen::Vector3d>& vertices,
     const std::size_t count = edges.sides(e).size();
     if (count <= 2 || count % 2 != 0) continue;
     const auto order = around_edge(vertices, triangles, edges, e);
-    // Pairing the first with the second …, or the second with the third …
+    // Compares two pairings: the first with the second …, or the second with the third ….
     std::array<int, 2> agreeing{0, 0};
     std::array<double, 2> angle{0, 0};
     for (std::size_t i = 0; i < count; ++i) {

@@ -13,7 +13,7 @@
 namespace ist {
 
 bool is_on_a_line(const double* a, const double* b, const double* c) {
-  for (const int skip : {0, 1, 2}) {  // seen along each axis
+  for (const int skip : {0, 1, 2}) {  // projected along each axis
     const int i = (skip + 1) % 3, j = (skip + 2) % 3;
     const double of_a[2] = {a[i], a[j]}, of_b[2] = {b[i], b[j]}, of_c[2] = {c[i], c[j]};
     if (orient2d_sign(of_a, of_b, of_c) != 0) return false;
@@ -39,7 +39,7 @@ void keep_only(std::vector<Triangle>& triangles, const std::vector<bool>& keep) 
   triangles.resize(kept);
 }
 
-/// `dropped`: ascending.
+/// `dropped` must be ascending.
 void remove(const std::vector<std::uint32_t>& dropped, std::vector<Triangle>& triangles) {
   if (dropped.empty()) return;
   auto kept = triangles.begin() + dropped[0];
@@ -56,7 +56,7 @@ struct Stack {
   int sum = 0;  ///< of the members' directions, relative to the first
 };
 
-/// Same cyclic order of the same corners.
+/// True if two triangles list the same corners in the same cyclic order.
 bool same_direction(const Triangle& a, const Triangle& b) {
   for (std::size_t k = 0; k < 3; ++k)
     if (a[0] == b[k]) return a[1] == b[(k + 1) % 3];
@@ -67,14 +67,14 @@ std::uint32_t corner_opposite(const std::vector<Triangle>& triangles, std::uint3
   return triangles[side / 3][(side + 2) % 3];
 }
 
-/// False: no triangles have the same three corners.
+/// False if no triangles have the same three corners.
 bool may_have_stacks(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
   return tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, edges.size()), false,
       [&](const tbb::blocked_range<std::size_t>& range, bool any) {
         for (std::size_t e = range.begin(); e < range.end() && !any; ++e) {
           const auto sides = edges.sides(e);
-          // Sides of a manifold edge are two; at others a stack is likely.
+          // A manifold edge has two sides; at others a stack is likely.
           any = sides.size() > 2 || (sides.size() == 2 && corner_opposite(triangles, sides[0]) ==
                                                               corner_opposite(triangles, sides[1]));
         }
@@ -89,7 +89,7 @@ std::vector<Stack> find_stacks(const std::vector<Triangle>& triangles, const Edg
   for (std::size_t e = 0; e < edges.size(); ++e) {
     at_edge.clear();
     for (const std::uint32_t side : edges.sides(e)) {
-      // Each stack is seen at its three edges; take it at that of its two smallest corners.
+      // A stack appears at its three edges; it is handled at the edge of its two smallest corners.
       const std::uint32_t opposite = corner_opposite(triangles, side);
       if (opposite > edges.high(e)) at_edge.emplace_back(opposite, side / 3);
     }
@@ -120,7 +120,7 @@ std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& v
   std::vector<std::uint32_t> dropped, open;
   for (const std::uint32_t t : degenerate)
     (has_repeated_corner(triangles[t]) ? dropped : open).push_back(t);
-  std::unordered_map<std::uint32_t, std::size_t> sides;  // left at the edges of open ones
+  std::unordered_map<std::uint32_t, std::size_t> sides;  // parity at the edges of open stacks
   const auto edge_of = [&](std::uint32_t t, std::size_t k) {
     return edges.edge_of(3 * std::size_t{t} + k);
   };
@@ -149,7 +149,7 @@ std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable&
   const std::vector<Stack> stacks = find_stacks(triangles, edges);
   if (stacks.empty()) return 0;
 
-  // Stacks that share an edge decide together.
+  // Stacks that share an edge are decided together.
   DisjointSets groups(stacks.size());
   std::vector<std::uint32_t> stack_at(edges.size(), kNoIndex);
   const auto edge_of = [&](const Stack& stack, std::size_t k) {
@@ -162,7 +162,7 @@ std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable&
       groups.unite(other, s);
     }
 
-  // Two possible reductions of a group: copies of a stack that stay, and edges that are odd.
+  // Two possible reductions of a group: the copies of a stack that remain, and the odd edges.
   const auto copies_left = [&](const Stack& stack, bool one_copy) {
     return one_copy ? 1u : static_cast<std::uint32_t>(std::abs(stack.sum));
   };
@@ -186,11 +186,11 @@ std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable&
   for (std::uint32_t s = 0; s < stacks.size(); ++s) {
     const Stack& stack = stacks[s];
     const std::uint32_t group = groups.find(s);
-    // Copies of the same direction are needless even where they cancel nothing.
+    // Copies of the same direction are redundant even if they cancel nothing.
     const bool one_copy =
         odd[group][1] < odd[group][0] || (odd[group][1] == odd[group][0] && !cancels[group]);
     const std::uint32_t copies = copies_left(stack, one_copy);
-    // The kept ones face in the direction of the sum.
+    // The remaining ones face in the direction of the sum.
     std::uint32_t kept = 0;
     for (const std::uint32_t t : stack.members) {
       const bool direction = same_direction(triangles[stack.members[0]], triangles[t]);

@@ -12,10 +12,10 @@
 
 namespace ist {
 
-/// Triangles by the cells of a grid that they may cover, seen along an axis.
+/// Triangles grouped by the cells of a grid that they may cover, seen along an axis.
 class TriangleColumns {
  public:
-  /// `position` gives where a vertex lies.
+  /// `position(v)` returns the position of a vertex.
   template <class Position>
   TriangleColumns(const std::vector<Triangle>& triangles, int axis, const Position& position)
       : axes_{(axis + 1) % 3, (axis + 2) % 3} {
@@ -51,16 +51,16 @@ class TriangleColumns {
         }
         const TriangleStrip strip(x, y);
         for (std::size_t r = from[1]; r <= to[1]; ++r) {
-          constexpr double kRoom = 1e-6;  // above all rounding
+          constexpr double kMargin = 1e-6;  // exceeds all rounding
           const double one = strip.at(static_cast<double>(r)), next = one + strip.slope;
-          row(r, std::max(from[0], place(std::min(one, next) + strip.left - kRoom)),
-              std::min(to[0], place(std::max(one, next) + strip.right + kRoom)));
+          row(r, std::max(from[0], place(std::min(one, next) + strip.left - kMargin)),
+              std::min(to[0], place(std::max(one, next) + strip.right + kMargin)));
         }
       }
     });
   }
 
-  /// Those that a line along the axis through p may meet, ascending.
+  /// The triangles that a line along the axis through p may meet, ascending.
   std::span<const std::uint32_t> about(const Eigen::Vector3d& p) const {
     const auto [x, y] = cell(seen(p));
     return at_cells_[y * cells_ + x];
@@ -69,7 +69,7 @@ class TriangleColumns {
  private:
   Eigen::Vector2d seen(const Eigen::Vector3d& p) const { return {p[axes_[0]], p[axes_[1]]}; }
 
-  /// Grows with the coordinates, whatever is rounded.
+  /// Monotone in the coordinates, in spite of rounding.
   std::array<std::size_t, 2> cell(const Eigen::Vector2d& p) const {
     const auto along = [&](int i) { return place((p[i] - low_[i]) * per_unit_[i]); };
     return {along(0), along(1)};

@@ -9,7 +9,7 @@ namespace {
 
 using Point = Eigen::Vector3d;
 
-/// A triangle and which of its corners the other one shares.
+/// A triangle, and which of its corners the other one shares.
 struct Side {
   std::array<const Point*, 3> corner;
   std::array<bool, 3> shared;
@@ -22,8 +22,8 @@ struct Side {
   }
 };
 
-/// The other's corners that are not shared all lie strictly on one side of the plane of `of`: what
-/// is in common lies in the plane, hence in shared corners and sides.
+/// True if all unshared corners of the other lie strictly on one side of the plane of `of`: then
+/// common points lie in the plane, hence in shared corners and sides.
 bool plane_parts(const Side& of, const Side& other) {
   const Point &a = *of.corner[0], p = *of.corner[1] - a, q = *of.corner[2] - a;
   const exact_sign::BoundedCross normal(p.data(), q.data());
@@ -38,10 +38,10 @@ bool plane_parts(const Side& of, const Side& other) {
   return above != below;
 }
 
-/// Seen along an axis, a side of `of` has its third corner strictly on one side and on the other,
-/// strictly, the other's corners but those that are ends of the side.
+/// True if, seen along an axis, a side of `of` strictly separates its third corner from the other's
+/// corners, apart from those that are ends of the side.
 bool line_parts(const Side& of, const Side& other, int x, int y) {
-  // 0: too close to tell.
+  // 0: too close to decide.
   const auto turn = [&](const Point& p, const Point& q, const Point& r) {
     const double left = (q[x] - p[x]) * (r[y] - p[y]), right = (q[y] - p[y]) * (r[x] - p[x]);
     const double area = left - right;
@@ -51,7 +51,7 @@ bool line_parts(const Side& of, const Side& other, int x, int y) {
   for (std::size_t k = 0; k < 3; ++k) {
     const Point &p = *of.corner[k], &q = *of.corner[(k + 1) % 3], &r = *of.corner[(k + 2) % 3];
     const int inward = turn(p, q, r);
-    if (inward == 0) return false;  // seen as a line
+    if (inward == 0) return false;  // degenerate in this view
     if (of.shared[(k + 2) % 3]) continue;
     bool parted = true;
     for (std::size_t c = 0; c < 3 && parted; ++c)
@@ -80,7 +80,7 @@ class FlatView {
     const double flat[3][2] = {{a[x()], a[y()]}, {b[x()], b[y()]}, {c[x()], c[y()]}};
     return orient2d_sign(flat[0], flat[1], flat[2]);
   }
-  /// Whether p, on the line through a and b, lies between them.
+  /// True if p, on the line through a and b, lies between them.
   bool between(const Point& p, const Point& a, const Point& b) const {
     for (const int k : {x(), y()})
       if (p[k] < std::min(a[k], b[k]) || p[k] > std::max(a[k], b[k])) return false;
@@ -106,7 +106,7 @@ bool all_on_one_side(int a, int b, int c) {
   return (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0);
 }
 
-/// Closed segment and closed triangle.
+/// True if a closed segment meets a closed triangle.
 bool segment_meets_triangle(const Point& p, const Point& q, const CornerPoints& t) {
   const int side_p = side_of(t, p), side_q = side_of(t, q);
   if (side_p * side_q > 0) return false;
@@ -125,7 +125,7 @@ bool segment_meets_triangle(const Point& p, const Point& q, const CornerPoints& 
   return false;
 }
 
-/// Turned so that corner k comes first.
+/// The triangle rotated so that corner k comes first.
 Triangle rotated(const Triangle& t, std::size_t k) {
   return {t[k], t[(k + 1) % 3], t[(k + 2) % 3]};
 }
@@ -170,14 +170,14 @@ bool meet_elsewhere(const std::vector<Point>& vertices, const Triangle& a, const
   }
   if (shared == 3) return true;
   const CornerPoints corners_a = corners_of(vertices, a), corners_b = corners_of(vertices, b);
-  if (shared == 2) {  // folded flat onto each other?
+  if (shared == 2) {  // possibly folded onto each other
     if (side_of(corners_a, corners_b[lone_in_b]) != 0) return false;
     const FlatView view(corners_a);
     const CornerPoints hinge = corners_of(vertices, rotated(a, lone_in_a));
     return view.turn(hinge[1], hinge[2], hinge[0]) ==
            view.turn(hinge[1], hinge[2], corners_b[lone_in_b]);
   }
-  if (shared == 1) {  // what they have in common beyond the corner reaches one's opposite side
+  if (shared == 1) {  // common points beyond the corner extend to a side opposite to it
     const CornerPoints from_a = corners_of(vertices, rotated(a, shared_in_a));
     const CornerPoints from_b = corners_of(vertices, rotated(b, shared_in_b));
     return segment_meets_triangle(from_a[1], from_a[2], corners_b) ||

@@ -7,9 +7,9 @@
 
 namespace ist {
 
-/// One vertex for equal coordinates, as weld() has it, of a mesh of which nothing is known.
-/// Throws Error for no triangles, indices that lead nowhere, coordinates that are not finite, and
-/// sizes and offsets that double cannot compute with.
+/// Merges vertices with equal coordinates, like weld(), of a mesh that may be invalid. Throws Error
+/// for no triangles, indices out of range, coordinates that are not finite, and sizes and offsets
+/// that double cannot handle.
 void weld_usable(TriangleMesh& mesh, const std::string& name);
 
 Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& points);
@@ -21,7 +21,7 @@ inline Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& vertice
   return box.extend(vertices[t[2]]);
 }
 
-/// The box around some triangles; vertices that none of them has do not count.
+/// The box around some triangles; unreferenced vertices do not count.
 inline Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& vertices,
                                      const std::vector<Triangle>& triangles) {
   Eigen::AlignedBox3d box;
@@ -35,11 +35,10 @@ inline double area_of(const std::vector<Eigen::Vector3d>& vertices, const Triang
 
 double largest_coordinate(const Eigen::AlignedBox3d& bounds);
 
-/// The spacing of doubles at `size`.
 inline double spacing_at(double size) { return std::ldexp(1.0, std::ilogb(size) - 52); }
 
-/// Like close_mesh() for a closed surface whose triangles face outward already: turns none. Shells
-/// that face inward are cavities. Does not look for intersections.
+/// close_mesh() for a closed surface whose triangles already face outward: flips none. Shells that
+/// face inward are cavities. Does not search for intersections.
 ClosedMesh close_oriented(TriangleMesh mesh, const std::string& name);
 
 }  // namespace ist

@@ -11,14 +11,14 @@
 namespace ist {
 namespace {
 
-constexpr std::size_t kDrawers = 256;  ///< by the hash's highest bits
+constexpr std::size_t kDrawers = 256;  ///< chosen by the hash's highest bits
 constexpr std::size_t kWeldChunk = 16'384;
 
 struct WeldEntry {
   std::uint32_t hash, point;
 };
 
-/// The entries of a drawer come in the order of their points: the first of equal ones is kept.
+/// The entries of a drawer are in the order of their points: the first of equal ones is kept.
 void find_first(const std::vector<Eigen::Vector3d>& points, const WeldEntry* entries,
                 std::size_t count, std::vector<std::uint32_t>& first) {
   constexpr std::uint32_t kFree = UINT32_MAX;
@@ -35,7 +35,7 @@ void find_first(const std::vector<Eigen::Vector3d>& points, const WeldEntry* ent
   }
 }
 
-/// [vertex] 1 where a triangle has it as a corner.
+/// [vertex] 1 if a triangle references it.
 std::vector<std::uint8_t> referenced(const TriangleMesh& mesh) {
   std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
   tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
@@ -51,13 +51,14 @@ void rename_corners(TriangleMesh& mesh, const std::vector<std::uint32_t>& names)
   });
 }
 
-/// Keeps the vertices that are used and named by themselves; `name` becomes the new one of each.
+/// Keeps the used vertices that are their own representatives; sets `name` to the new index of
+/// each.
 void keep_first(TriangleMesh& mesh, const std::vector<std::uint8_t>& used,
                 std::vector<std::uint32_t>& name) {
   std::atomic<bool> all{true};
   tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(name.size()),
                     [&](std::uint32_t v) {
-                      mesh.vertices[v] += Eigen::Vector3d::Zero();  // one zero only
+                      mesh.vertices[v] += Eigen::Vector3d::Zero();  // turns −0 into 0
                       if (used[v] == 0 || name[v] != v) all.store(false, std::memory_order_relaxed);
                     });
   if (all) return;
@@ -66,7 +67,7 @@ void keep_first(TriangleMesh& mesh, const std::vector<std::uint8_t>& used,
     if (used[v] == 0) continue;
     const bool is_first = name[v] == v;
     if (is_first) mesh.vertices[kept] = mesh.vertices[v];
-    name[v] = is_first ? kept++ : name[name[v]];  // the first's is known by now
+    name[v] = is_first ? kept++ : name[name[v]];  // the representative's new index is already known
   }
   mesh.vertices.resize(kept);
   rename_corners(mesh, name);
@@ -76,7 +77,7 @@ void keep_first(TriangleMesh& mesh, const std::vector<std::uint8_t>& used,
 
 std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& points,
                                        const std::vector<std::uint8_t>& used) {
-  // Chunks of points count what they have for each drawer, then put it there in order.
+  // Chunks of points count their entries for each drawer, then write them there in order.
   const std::size_t chunks = (points.size() + kWeldChunk - 1) / kWeldChunk;
   std::vector<std::uint64_t> hashes(points.size());
   std::vector<std::array<std::uint32_t, kDrawers>> place(chunks);
@@ -138,7 +139,7 @@ TriangleMesh weld_among(const TriangleMesh& mesh, double tolerance,
   const std::vector<std::uint8_t> used = referenced(mesh);
   TriangleMesh result;
   std::vector<std::uint32_t> kept_as(mesh.vertices.size(), kNone);
-  // Kept vertices by their cell's hash. What is near enough lies in one or two cells along an axis.
+  // Kept vertices by their cell's hash. Candidates lie in one or two cells along an axis.
   const double width = 4 * tolerance;
   const auto count = static_cast<std::size_t>(std::count(among.begin(), among.end(), true));
   const std::size_t mask = std::bit_ceil(2 * count + 1) - 1;

@@ -15,20 +15,21 @@ inline std::uint64_t hash_of_bits(const Eigen::Vector3d& p) {
   return hash;
 }
 
-/// [point] the smallest index of a used point with equal coordinates (−0 = 0); anything for unused
-/// ones. `used` [point]: 0 or 1; those are finite. On the caller's TBB threads.
+/// [point] The smallest index of a used point with equal coordinates (−0 = 0); unspecified for
+/// unused ones. `used` [point]: 0 or 1; used points must be finite. Runs on the caller's TBB
+/// threads.
 std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& points,
                                        const std::vector<std::uint8_t>& used);
 
-/// One vertex for all that lie within `tolerance` [u] of the first of them in file order (0: equal
-/// coordinates, −0 = 0); triangles follow. Unreferenced vertices are dropped, the rest keep their
-/// order. Every referenced coordinate must be finite.
+/// Merges all vertices within `tolerance` [u] of the first of them in file order (0: equal
+/// coordinates, −0 = 0), and renumbers triangles. Unreferenced vertices are dropped, the rest keep
+/// their order. Every referenced coordinate must be finite.
 TriangleMesh weld(TriangleMesh mesh, double tolerance);
 
-/// Drops unreferenced vertices, the last step of the two above.
+/// Drops unreferenced vertices, the last step of the functions above.
 void drop_unused(TriangleMesh& mesh);
 
-/// Like weld() with a tolerance above 0, but only of the vertices in `among` (by index).
+/// weld() with a tolerance above 0, limited to the vertices in `among` (by index).
 TriangleMesh weld_among(const TriangleMesh& mesh, double tolerance, const std::vector<bool>& among);
 
 }  // namespace ist

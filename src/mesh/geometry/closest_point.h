@@ -8,9 +8,9 @@
 #include "mesh/geometry/triangle_frame.h"
 
 // Closest-point queries for host and device. The float answer is the minimum of one fixed formula
-// (closest_in_frame over the blocks' frames) over *all* triangles, the smaller index among equals:
-// it does not depend on the hierarchy or on the order of visits, so another hierarchy on another
-// machine gives the same bits. Boxes are skipped only where no computed distance in them can count.
+// (closest_in_frame over the blocks' frames) over *all* triangles, the smaller index among equals.
+// It does not depend on the hierarchy or on the order of visits, so another hierarchy on another
+// machine gives the same bits. Boxes are skipped only if no computed distance in them can count.
 
 namespace ist {
 
@@ -28,7 +28,7 @@ constexpr int kBvhLevels = (kBvhStackSize - 1) / 3;
 /// (largest coordinate), the roundings of the query, the frames and the boxes included.
 IST_HD inline float float_distance_error(float reach) { return (reach + 2.0f) * 0x1p-20f; }
 
-/// The same of queries from p.
+/// The same for queries from p.
 IST_HD inline float distance_error_at(const float p[3]) {
   float reach = 0;
   for (int k = 0; k < 3; ++k) {
@@ -90,7 +90,7 @@ IST_HD inline void load_axes(const OrientedBoxes<kWidth>& boxes, int child, Lane
 }
 
 /// Squared distances from p to the oriented boxes from `child` on. Never above the exact ones:
-/// twice the error of a float distance is taken off for the roundings here and for directions that
+/// twice the error of a float distance is subtracted for the roundings here and for directions that
 /// are not quite orthogonal unit vectors.
 template <class Lanes, int kWidth>
 IST_HD inline Lanes oriented_distance2(const OrientedBoxes<kWidth>& boxes, int child,
@@ -135,7 +135,7 @@ IST_HD inline void block_points(const TriangleBlock& block, const float p[3], Bl
   }
 }
 
-/// A triangle within reach of a query, as the visitor of for_triangles_near gets it.
+/// A triangle within reach of a query, passed to the visitor of for_triangles_near.
 struct NearTriangle {
   FramePoint<float> closest;  ///< unit frame
   std::uint32_t triangle;
@@ -149,10 +149,10 @@ struct NearTriangle {
   }
 };
 
-/// Visits triangles near p (unit frame), near ones first by tendency. `visit(NearTriangle)` returns
-/// the new squared radius (never larger than before; radius2 to go on as it was). Every triangle
-/// whose float distance² is ≤ the last radius is visited exactly once; which others are, and in
-/// what order, is not specified.
+/// Visits triangles near p (unit frame), roughly the nearest first. `visit(NearTriangle)` returns
+/// the new squared radius, never larger than before; radius2 keeps it. Every triangle whose float
+/// distance² is ≤ the last radius is visited exactly once. Which others are visited, and in what
+/// order, is unspecified.
 template <class Visit>
 IST_HD void for_triangles_near(const MeshView& mesh, const float p[3], float radius2,
                                Visit&& visit) {
@@ -205,8 +205,8 @@ IST_HD void for_triangles_near(const MeshView& mesh, const float p[3], float rad
   }
 }
 
-/// The closest triangle of the mesh. `limit2`: squared distance beyond which nothing is of
-/// interest; where no triangle is that close, distance2 = limit2 and triangle = kNoTriangle.
+/// The closest triangle of the mesh. `limit2`: squared distance beyond which triangles are ignored;
+/// if none is that close, distance2 = limit2 and triangle = kNoTriangle.
 IST_HD inline NearestTriangle nearest_triangle(const MeshView& mesh, const float p[3],
                                                float limit2 = 1e30f) {
   NearestTriangle best;

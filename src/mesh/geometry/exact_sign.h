@@ -4,11 +4,11 @@
 
 #include "base/host_device.h"
 
-// Orientation predicates, for host and device. A bound on the rounding error decides nearly always
+// Orientation predicates, for host and device. A bound on the rounding error nearly always decides
 // (J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
 // Predicates", 1997); else the determinant's exact terms are summed by S. M. Rump's extraction
-// ("Ultimately Fast Accurate Summation", 2009), which needs no memory: a GPU reserves what a
-// thread may need for all threads that it can run.
+// ("Ultimately Fast Accurate Summation", 2009), which needs no memory: a GPU reserves the memory
+// that one thread may need for all threads that it can run.
 
 namespace ist {
 namespace exact_sign {
@@ -20,7 +20,7 @@ constexpr double kOrient3dBound = (7 + 56 * kEpsilon) * kEpsilon;
 IST_HD inline int sign_of(double value) { return (value > 0) - (value < 0); }
 IST_HD inline double magnitude_of(double value) { return value < 0 ? -value : value; }
 
-/// a × b, and what bounds the rounding of its product with a third vector.
+/// a × b, and a bound for the rounding of its product with a third vector.
 struct BoundedCross {
   double value[3], magnitude[3];
 
@@ -34,7 +34,7 @@ struct BoundedCross {
     }
   }
 
-  /// Sign of the triple product with d; 0 where rounding may have decided it.
+  /// Sign of the triple product with d; 0 if rounding may have decided it.
   int side_of(const double* d) const {
     constexpr double kUnderflow = 1e-290;
     double product = 0, bound = 0;
@@ -68,11 +68,11 @@ IST_HD inline double power_above(double x) {
 }
 
 /// Exact sign of the sum of the products terms.product(0) … terms.product(kCount − 1), which are
-/// made anew every time they are needed. Over- and underflow aside.
+/// recomputed whenever they are needed. Assumes no over- or underflow.
 template <int kCount, class Terms>
 IST_HD int sign_of_sum(const Terms& terms) {
   static_assert(4 * kCount + 2 <= 128);
-  constexpr double kRoom = 128;  // ≥ number of terms + 2
+  constexpr double kHeadroom = 128;  // ≥ number of terms + 2
   double largest = 0;
   for (int i = 0; i < kCount; ++i) {
     const ProductTerms product = terms.product(i);
@@ -80,10 +80,10 @@ IST_HD int sign_of_sum(const Terms& terms) {
       largest = magnitude_of(term) > largest ? magnitude_of(term) : largest;
   }
   if (!(largest > 0)) return 0;
-  // Every term is cut at multiples of σ 2^-53, then what is left of it at multiples of σ 2^-99, …
+  // Every term is cut at multiples of σ 2^-53, its remainder at multiples of σ 2^-99, and so on.
   // The pieces of one level sum without error. `sum` stays exact while it is small; once it is not,
-  // what is still left cannot change its sign.
-  const double first_sigma = power_above(largest) * kRoom;
+  // the remainders cannot change its sign.
+  const double first_sigma = power_above(largest) * kHeadroom;
   double sum = 0, sigma = first_sigma;
   for (int level = 0;; ++level) {
     double pieces = 0, most_left = 0;
@@ -94,16 +94,16 @@ IST_HD int sign_of_sum(const Terms& terms) {
         for (int k = 0; k <= level; ++k) {
           piece = (cut + left) - cut;
           left -= piece;
-          cut *= kRoom * kEpsilon;
+          cut *= kHeadroom * kEpsilon;
         }
         pieces += piece;
         most_left = magnitude_of(left) > most_left ? magnitude_of(left) : most_left;
       }
     }
     sum += pieces;
-    if (most_left == 0 || magnitude_of(sum) >= kRoom * kRoom * kEpsilon * sigma)
+    if (most_left == 0 || magnitude_of(sum) >= kHeadroom * kHeadroom * kEpsilon * sigma)
       return sign_of(sum);
-    sigma *= kRoom * kEpsilon;
+    sigma *= kHeadroom * kEpsilon;
   }
 }
 
@@ -118,7 +118,7 @@ struct Area {
   }
 };
 
-/// One of the six products of |x y z|.
+/// One of the six products of det(x, y, z).
 IST_HD inline ProductTerms determinant_product(const double* x, const double* y, const double* z,
                                                double sign, int i) {
   const int column = i / 2, j = (column + 1) % 3, k = (column + 2) % 3;
@@ -137,7 +137,7 @@ struct Volume {
   }
 };
 
-/// |a−q b−q c−q|, where these differences are exact: a quarter of the products.
+/// |a−q b−q c−q|, if these differences are exact: a quarter of the products.
 struct VolumeSeen {
   double p[3][3];
 
@@ -148,7 +148,8 @@ struct VolumeSeen {
     bool exact = true;
     for (int k = 0; k < 3; ++k) {
       const double difference = from[k] - q[k];
-      const double q_part = difference - from[k];  // −q, as far as it got in (Knuth's two-sum)
+      const double q_part =
+          difference - from[k];  // the part of −q that was added (Knuth's two-sum)
       exact = exact && from[k] == difference - q_part && q_part == -q[k];
       p[row][k] = difference;
     }
@@ -169,7 +170,7 @@ IST_HD_COLD int orient3d_exact(const double a[3], const double b[3], const doubl
 
 }  // namespace exact_sign
 
-/// Sign (−1, 0, 1) of the area of (a, b, q): +1 where q lies left of a → b. Exact but for overflow.
+/// Sign (−1, 0, 1) of the area of (a, b, q): +1 if q lies left of a → b. Exact unless it overflows.
 IST_HD inline int orient2d_sign(const double a[2], const double b[2], const double q[2]) {
   using namespace exact_sign;
   const double left = (a[0] - q[0]) * (b[1] - q[1]);
@@ -180,8 +181,8 @@ IST_HD inline int orient2d_sign(const double a[2], const double b[2], const doub
   return orient2d_exact(a, b, q);
 }
 
-/// Sign of the volume of (a, b, c, q): +1 where q lies behind abc (inside, for an outward
-/// triangle), −1 where abc is seen counter-clockwise from q. Exact in the same sense.
+/// Sign of the volume of (a, b, c, q): +1 if q lies behind abc (inside, for an outward triangle),
+/// −1 if abc appears counter-clockwise from q. Exact in the same sense.
 IST_HD inline int orient3d_sign(const double a[3], const double b[3], const double c[3],
                                 const double q[3]) {
   using namespace exact_sign;

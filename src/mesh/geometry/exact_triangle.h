@@ -36,7 +36,7 @@ IST_HD inline double exact_closest_in(const Corners& corners, const double p[3],
   return q.distance2;
 }
 
-/// Rules triangles out by their float distances from a double point.
+/// Excludes triangles by their float distances from a double point.
 struct ExactReach {
   float p[3];   ///< the point, rounded
   float error;  ///< of a float distance from it
@@ -53,19 +53,19 @@ struct ExactReach {
 
   /// A triangle may lie within `distance2` only if its float distance² is at most this.
   IST_HD float reach2(double distance2) const {
-    // A float at or above distance2; large ones all count as infinitely far.
+    // A float at or above distance2; large ones count as infinite.
     const float above =
         distance2 < 1e30 ? static_cast<float>(distance2) * (1 + 0x1p-20f) + 1e-37f : 1e35f;
     return prune_distance2(above, error);
   }
 };
 
-/// Meshes above this mean_slenderness() are of needles, whose boxes along the axes tell little.
+/// Meshes above this mean_slenderness() consist of needles, which axis-aligned boxes bound poorly.
 constexpr double kSlender = 32;
 
-/// How much larger triangles' boxes are than the triangles: half their surface over the area.
-/// `corners(t)`: of triangle t. About 4 for even triangles, twice the length over the width for
-/// needles. The same bits for any number of threads.
+/// The ratio of the triangles' boxes to the triangles: half the boxes' surface over the triangles'
+/// area. `corners(t)`: of triangle t. About 4 for regular triangles, twice the length over the
+/// width for needles. The same bits for any number of threads.
 template <class CornersOf>
 double mean_slenderness(std::size_t count, const CornersOf& corners) {
   using Sums = std::pair<double, double>;  // boxes, triangles

@@ -12,7 +12,7 @@ namespace ist {
 
 /// Crossing of the edge p → q with the half-line {y > y0, z = z0} of the (y, z) plane: +1 upward,
 /// −1 downward, 0 none. A corner at z0 counts as below and an edge through (y0, z0) as not
-/// crossing. The edge is looked at from its lower end, whichever triangle asks.
+/// crossing. The edge is evaluated from its lower end, so both its triangles get the same answer.
 IST_HD inline int edge_crossing(const double* p, const double* q, const double yz[2]) {
   const bool upward = !(p[2] > yz[1]);
   if (upward == !(q[2] > yz[1])) return 0;
@@ -24,7 +24,7 @@ IST_HD inline int edge_crossing(const double* p, const double* q, const double y
 }
 
 /// Winding number of a triangle's outline, seen along x, about (y0, z0): the sign of its normal's x
-/// where the line pierces it, else 0.
+/// if the line pierces it, else 0.
 IST_HD inline int pierced(const Corners& t, const double yz[2]) {
   return edge_crossing(t.p[0], t.p[1], yz) + edge_crossing(t.p[1], t.p[2], yz) +
          edge_crossing(t.p[2], t.p[0], yz);
@@ -43,8 +43,8 @@ struct Extent {
   }
 };
 
-/// Where the line (·, y0, z0) meets a triangle that it pierces: the corners weighted with the
-/// areas opposite them. Never outside the triangle's extent in x.
+/// The x at which the line (·, y0, z0) pierces a triangle: the corners weighted with the areas
+/// opposite them. Never outside the triangle's extent in x.
 IST_HD inline double crossing_x(const Corners& t, const double yz[2]) {
   double weight_sum = 0, sum = 0;
   for (int i = 0; i < 3; ++i) {
@@ -61,18 +61,18 @@ IST_HD inline double crossing_x(const Corners& t, const double yz[2]) {
   return mean < x.low ? x.low : x.high < mean ? x.high : mean;
 }
 
-/// The ray goes towards the nearer end: the signs on the other half of the line are negated.
+/// The ray points towards the nearer end: the signs on the other half of the line are negated.
 IST_HD inline bool ray_towards_plus(const double p[3]) { return p[0] >= 0; }
 
-/// Whether the line through p parallel to x meets a triangle that it pierces, which faces
-/// `facing`, further along +x than p.
+/// True if the line through p parallel to x pierces a triangle, which faces `facing`, further along
+/// +x than p.
 IST_HD inline bool lies_beyond(const Corners& t, int facing, const double p[3]) {
   const Extent x(t);
   if (!(x.low <= p[0] && p[0] <= x.high)) return p[0] < x.low;
   return orient3d_sign(t.p[0], t.p[1], t.p[2], p) * facing > 0;
 }
 
-/// The term of a triangle in the winding number of p.
+/// A triangle's term of the winding number of p.
 IST_HD inline int ray_winding(const Corners& t, const double p[3]) {
   const int facing = pierced(t, p + 1);
   if (facing == 0) return 0;

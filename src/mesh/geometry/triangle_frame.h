@@ -7,15 +7,15 @@
 
 namespace ist {
 
-/// Spacing of the numbers above 1. (Device code may not call numeric_limits' functions.)
+/// Spacing of the numbers above 1. (Device code must not call numeric_limits' functions.)
 template <class Real>
 constexpr Real kSpacing = std::numeric_limits<Real>::epsilon();
 
 /// A triangle in its own orthonormal frame: origin at one end of its longest edge, u along that
 /// edge, v towards the third corner, n = u × v. In it the corners are (0, 0), (length, 0) and
 /// (apex, height), the angles at the first two are acute, and a distance to the triangle is a
-/// problem in the plane. Built on the longest edge, the frame is accurate for needles and caps
-/// too: an error of the direction v is worth at most ε · length over the triangle's height.
+/// problem in the plane. Built on the longest edge, the frame is accurate for needles and caps too:
+/// an error of the direction v has an effect of at most ε · length over the triangle's height.
 template <class Real>
 struct TriangleFrame {
   Real origin[3];
@@ -35,7 +35,6 @@ IST_HD inline Real dot3(const Real a[3], const Real b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// a × b.
 template <class Real>
 IST_HD inline void cross3(const Real a[3], const Real b[3], Real out[3]) {
   for (int k = 0; k < 3; ++k) {
@@ -54,7 +53,7 @@ IST_HD inline void area_normal(const Real a[3], const Real b[3], const Real c[3]
 
 template <class Real>
 IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3], const Real c[3]) {
-  // Choices instead of indices: what is indexed at run time leaves a GPU's registers.
+  // Choices instead of indices: arrays indexed at run time do not fit into a GPU's registers.
   const auto edge2 = [](const Real from[3], const Real to[3]) {
     const Real e[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
     return dot3(e, e);
@@ -71,7 +70,7 @@ IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3],
   }
   TriangleFrame<Real> f = {{p[0], p[1], p[2]}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0, 0, 0};
   f.length = std::sqrt(longest2);
-  if (!(f.length > 0)) return f;  // a single point: any frame will do
+  if (!(f.length > 0)) return f;  // a single point: any frame is valid
   for (int k = 0; k < 3; ++k) f.u[k] = (q[k] - p[k]) / f.length;
   Real w[3] = {r[0] - p[0], r[1] - p[1], r[2] - p[2]};
   f.apex = dot3(w, f.u);
@@ -83,7 +82,7 @@ IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3],
   f.height = std::sqrt(dot3(w, w));
   if (f.height > 4 * kSpacing<Real> * f.length) {
     for (int k = 0; k < 3; ++k) f.v[k] = w[k] / f.height;
-  } else {  // a segment but for rounding: any direction across it will do
+  } else {  // a segment up to rounding: any perpendicular direction is valid
     f.height = 0;
     const Real x = std::abs(f.u[0]), y = std::abs(f.u[1]), z = std::abs(f.u[2]);
     const int axis = x <= y && x <= z ? 0 : (y <= z ? 1 : 2);
@@ -99,12 +98,12 @@ IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3],
   return f;
 }
 
-/// The frame of a lane without a triangle: far from everything.
+/// The frame of a lane without a triangle: far from all points.
 IST_HD inline TriangleFrame<double> absent_frame() {
   return {{1e18, 1e18, 1e18}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0, 0, 0};
 }
 
-/// Rounds a frame into a lane of a hierarchy's block (TriangleBlock, WideBlock).
+/// Stores a rounded frame in a lane of a hierarchy's block (TriangleBlock, WideBlock).
 template <class Block>
 IST_HD void write_frame(Block& block, int lane, const TriangleFrame<double>& f) {
   for (int k = 0; k < 3; ++k) {
@@ -119,12 +118,12 @@ IST_HD void write_frame(Block& block, int lane, const TriangleFrame<double>& f) 
 }
 
 /// Closest point of the triangle (0, 0), (length, 0), (apex, height) to (x, y), z off its plane.
-/// Free of branches: float, double and vectors of them run it alike, lane by lane the same bits.
+/// Without branches: float, double and vectors of them give the same bits in every lane.
 template <class Lane>
 IST_HD inline FramePoint<Lane> closest_in_frame(Lane x, Lane y, Lane z, Lane length, Lane apex,
                                                 Lane height) {
   const Lane zero{}, one = zero + 1;
-  const Lane smallest = zero + 1e-37f;  // only keeps 0 / 0 away: collapsed edges give t = 0
+  const Lane smallest = zero + 1e-37f;  // avoids 0 / 0: collapsed edges give t = 0
   const auto clamp = [](Lane value, Lane lower, Lane upper) {
     const Lane raised = value > lower ? value : lower;
     return raised < upper ? raised : upper;
@@ -145,14 +144,14 @@ IST_HD inline FramePoint<Lane> closest_in_frame(Lane x, Lane y, Lane z, Lane len
   const auto inside = (height > zero) & (y * apex <= x * height) & (from_b * height <= y * left);
   px = inside ? x : px;
   py = inside ? y : py;
-  // Below the longest edge, both angles at it being acute, the closest point is on that edge.
+  // Below the longest edge, whose angles are acute, the closest point is on that edge.
   px = y <= zero ? clamp(x, zero, length) : px;
   py = y <= zero ? zero : py;
   const Lane dx = x - px, dy = y - py;
   return {px, py, z * z + (dx * dx + dy * dy)};
 }
 
-/// Closest point of a triangle to p. Error of the distance: a few roundings of |p − origin| +
+/// Closest point of a triangle to p. The error of the distance is a few roundings of |p − origin| +
 /// length, whatever the triangle's shape.
 template <class Real>
 IST_HD inline FramePoint<Real> closest_in_frame(const TriangleFrame<Real>& f, const Real p[3]) {

@@ -7,12 +7,12 @@
 namespace ist {
 
 /// The strip of a plane along a triangle's edge from its lowest to its highest corner that contains
-/// the triangle: narrow where its box is wide, if it is a needle.
+/// the triangle: narrow even if its box is wide, for needles.
 struct TriangleStrip {
-  double at0, slope;   ///< the edge's x at y = 0, and how it grows with y
+  double at0, slope;   ///< the edge's x at y = 0, and dx/dy
   double left, right;  ///< the strip's sides along x, from the edge
 
-  /// Corners; their y are not all the same.
+  /// The corners must not all have the same y.
   TriangleStrip(const std::array<double, 3>& x, const std::array<double, 3>& y) {
     const auto [first, last] = std::minmax_element(y.begin(), y.end());
     const auto low = static_cast<std::size_t>(first - y.begin()),

@@ -8,17 +8,17 @@
 
 namespace ist {
 
-/// A bounding volume hierarchy over all triangles of a mesh. Built by binned surface area
-/// heuristic, the same for any number of threads. No query's answer depends on its shape.
+/// A bounding volume hierarchy over all triangles of a mesh, built by the binned surface area
+/// heuristic. The same for any number of threads. No query's answer depends on its shape.
 struct Bvh {
   std::unique_ptr<BvhNode[]> nodes;
   std::unique_ptr<TriangleBlock[]> blocks;
   std::uint32_t root = kBvhEmpty;
-  std::unique_ptr<OrientedBoxes<kBvhWidth>[]> oriented;  ///< of meshes of needles
+  std::unique_ptr<OrientedBoxes<kBvhWidth>[]> oriented;  ///< for meshes of needles
 };
 
-/// Oriented boxes of a hierarchy's `nodes`, around the few triangles below each child, where the
-/// mesh is of needles; null where it is not.
+/// Oriented boxes of a hierarchy's `nodes`, around the few triangles below each child, if the mesh
+/// consists of needles; else null.
 std::unique_ptr<OrientedBoxes<kBvhWidth>[]> oriented_boxes(const MeshView& mesh, std::size_t nodes);
 
 /// Builds over `triangles` (three indices each) of exact unit-frame vertices (three doubles each).

@@ -13,24 +13,24 @@
 #include "mesh/geometry/triangle_frame.h"
 #include "mesh/hierarchy/bvh.h"
 
-// Many triangles are sorted into cells of a coarse grid first; the tree over the cells is cheap,
-// and one thread each builds what is below a few of them.
+// Many triangles are sorted into cells of a coarse grid first. The tree over the cells is cheap;
+// below a few cells each, a single thread builds the rest.
 
 namespace ist {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-/// Below this depth ranges are halved, whatever it costs: stacks are of fixed size.
+/// Below this depth ranges are halved at any cost: stacks have a fixed size.
 constexpr int kHeuristicDepth = 40;
-// Deeper down numbers are halved: of the cells of one grid, then of the triangles of one cell.
+// Below that, counts are halved: of the cells of one grid, then of the triangles of one cell.
 static_assert(kHeuristicDepth + 12 + 28 < kBvhLevels);
-constexpr float kFlat = 1e-30f;         ///< centres no further apart are taken to be one
+constexpr float kFlat = 1e-30f;         ///< closer centres count as equal
 constexpr std::size_t kTreelet = 1024;  ///< triangles below a few cells
-constexpr std::size_t kSerial = 8192;   ///< so many triangles are not worth a grid
-constexpr std::size_t kChunk = 16384;   ///< triangles that one thread sorts into cells in one go
-constexpr std::size_t kManyItems = 65'536;  ///< are worth a finer grid
+constexpr std::size_t kSerial = 8192;   ///< fewer triangles do not repay a grid
+constexpr std::size_t kChunk = 16384;   ///< triangles that one thread sorts into cells at a time
+constexpr std::size_t kManyItems = 65'536;  ///< so many repay a finer grid
 
-using Lanes [[gnu::vector_size(16)]] = float;  ///< x, y, z and one that does not count
+using Lanes [[gnu::vector_size(16)]] = float;  ///< x, y, z and an unused lane
 using Places [[gnu::vector_size(16)]] = std::int32_t;
 
 Lanes lowest(Lanes a, Lanes b) { return a < b ? a : b; }
@@ -50,13 +50,13 @@ struct GrowingBox {
   }
 };
 
-/// A triangle or a cell of triangles that is being sorted into a leaf. The spare lanes store two
-/// numbers below 2^30, as bits of floats between 1e-38 and 8: arithmetic with subnormal floats is
-/// slow, and with infinite ones it traps.
+/// A triangle or a cell of triangles that is sorted into a leaf. The spare lanes store two numbers
+/// below 2^30, as bits of floats between 1e-38 and 8: arithmetic with subnormal floats is slow, and
+/// with infinite ones it traps.
 struct Item {
   Lanes lower, upper;
 
-  Item() {}  // left as it is, for threads to fill
+  Item() {}  // uninitialised, for threads to fill
   Item(const GrowingBox& around, std::uint32_t name, std::uint32_t count)
       : lower(around.lower), upper(around.upper) {
     lower[3] = std::bit_cast<float>(name + kLeastNormal);
@@ -97,7 +97,7 @@ struct SortExtent {
   }
 };
 
-/// Items that hang below one node.
+/// The items below one node.
 struct Range {
   std::span<Item> items;
   SortExtent extent;
@@ -128,12 +128,12 @@ float blocks_of(std::uint32_t triangles) {
   return static_cast<float>((triangles + kBvhWidth - 1) / kBvhWidth);
 }
 
-/// Where a range is cut: slices before `bin` along `axis` go left. None: axis < 0.
+/// The position of a cut: slices before `bin` along `axis` go left. None: axis < 0.
 struct Cut {
   int axis = -1, bin = 0;
 };
 
-/// The binned surface area heuristic's least.
+/// The minimum of the binned surface area heuristic.
 template <int kBins>
 Cut cheapest_cut(const Range& range, const Slices& slices) {
   GrowingBox boxes[3][kBins];
@@ -185,7 +185,7 @@ std::array<Range, 2> parted(const Range& range, std::size_t left) {
           Range{second, extent_of(second), range.depth + 1}};
 }
 
-/// A full block and the rest of a few triangles, across the longest side.
+/// Divides a few triangles across the longest side into a full block and the rest.
 std::array<Range, 2> parted_few(const Range& range) {
   const Lanes size = range.extent.centres.upper - range.extent.centres.lower;
   const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : (size[1] >= size[2] ? 1 : 2);
@@ -197,14 +197,15 @@ std::array<Range, 2> parted_few(const Range& range) {
 }
 
 std::array<Range, 2> halves(const Range& range) {
-  constexpr std::size_t kMany = 64;  // items: finer slices are worth their cost
+  constexpr std::size_t kMany = 64;  // items: finer slices repay their cost
   const std::size_t count = range.items.size();
   if (count == range.extent.count && count <= 2 * kBvhWidth) return parted_few(range);
   if (range.depth >= kHeuristicDepth) return parted(range, count / 2);
   const Slices slices(range.extent.centres, count < kMany ? 8 : 16);
   const Cut cut = count < kMany ? cheapest_cut<8>(range, slices) : cheapest_cut<16>(range, slices);
-  if (cut.axis < 0) return parted(range,
-                                  count / 2);  // all centres coincide: any half is as good
+  if (cut.axis < 0)
+    return parted(range,
+                  count / 2);  // all centres coincide: any half is equally good
   SortExtent extent[2];
   std::size_t left = 0, right = count;
   const auto is_left = [&](const Item& item) {
@@ -312,7 +313,7 @@ class CellTree {
     add_top({cells_, whole, range.depth});
   }
 
-  /// All of it, the groups built.
+  /// The complete tree with all groups.
   Tree tree() {
     const auto items = std::make_unique_for_overwrite<Item[]>(range_.items.size());
     const std::span<Item> sorted(items.get(), range_.items.size());
@@ -387,7 +388,7 @@ class CellTree {
     });
   }
 
-  /// of_chunk_ contains the places where a chunk's items of a cell begin.
+  /// Sorts items; of_chunk_ contains the positions of the first items of each chunk in each cell.
   void sort_into(std::span<Item> sorted) {
     tbb::parallel_for(std::size_t{0}, chunks_of(range_.items.size()), [&](std::size_t c) {
       for (const Item& item : chunk_of(range_.items, c))
@@ -429,7 +430,7 @@ class CellTree {
   const int edge_;  ///< of the grid, in cells
   const std::size_t cells_of_grid_ = std::size_t(edge_) * std::size_t(edge_) * std::size_t(edge_);
   Lanes low_, scale_;
-  std::vector<std::uint32_t> of_chunk_;  ///< [chunk][cell] items, then the place of the first
+  std::vector<std::uint32_t> of_chunk_;  ///< [chunk][cell] items, then the position of the first
   std::vector<Item> cells_;
   std::vector<BvhNode> top_;
   std::vector<Group> groups_;

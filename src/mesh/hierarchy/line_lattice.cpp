@@ -11,7 +11,7 @@ namespace {
 /// The crossings of rows [from, to): line (i, j) is group (j − from) ny + i.
 LatticeCrossings cross_rows(const MeshView& mesh, const LineLattice& lattice, std::uint32_t from,
                             std::uint32_t to) {
-  // Threads share the triangles; where these are few, also their rows.
+  // Threads share the triangles and, if these are few, also their rows.
   const bool is_few = mesh.triangle_count < 4096;
   const auto each = [&](const auto& visit) {
     const auto here = [&](std::size_t line, const Crossing& crossing) {
@@ -41,7 +41,7 @@ LatticeCrossings cross_rows(const MeshView& mesh, const LineLattice& lattice, st
   return LatticeCrossings::in_parallel(std::size_t{to - from} * lattice.ny, each, comes_before);
 }
 
-/// About how many crossings all lines have: how often the triangles cover a cell.
+/// The approximate number of crossings of all lines: how often the triangles cover a cell.
 double expected_crossings(const MeshView& mesh, const LineLattice& lattice) {
   double doubled = 0;
   for (std::uint32_t triangle = 0; triangle < mesh.triangle_count; ++triangle) {

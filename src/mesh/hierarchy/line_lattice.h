@@ -10,15 +10,15 @@
 
 namespace ist {
 
-constexpr double kGoldenRatio = 0.6180339887498949;  ///< the most irrational part of a step
+constexpr double kGoldenRatio = 0.6180339887498949;  ///< the most irrational fraction of a step
 
-/// Lines along x, evenly spaced: line (i, j) at y(i, j), z(j). All of them together are cut with a
-/// mesh by drawing its triangles onto the lattice, which needs no hierarchy.
+/// Lines along x, evenly spaced: line (i, j) at y(i, j), z(j). They are intersected with a mesh by
+/// rasterising its triangles onto the lattice, which needs no hierarchy.
 struct LineLattice {
   double y0 = 0, z0 = 0;          ///< lower corner of the lattice, unit frame
   double step_y = 0, step_z = 0;  ///< unit frame, > 0
   double offset = 0;              ///< of the first line from the lower corner, over the step
-  double shift = 0;               ///< of every row against the one before, over the step
+  double shift = 0;               ///< of every row relative to the one before, over the step
   std::uint32_t ny = 0, nz = 0;   ///< lines in a row, rows
 
   /// Shift of row j's first line from the lower corner, in steps.
@@ -31,17 +31,17 @@ struct LineLattice {
   IST_HD std::uint64_t lines() const { return std::uint64_t{ny} * nz; }
 };
 
-/// The numbers among 0 … count − 1 whose lines may lie in [low, high], rounding included.
+/// The indices in 0 … count − 1 whose lines may lie in [low, high], rounding included.
 struct LatticeRange {
   std::uint32_t first, last;  ///< [first, last)
 
   IST_HD LatticeRange(double low, double high, std::uint32_t count) {
-    constexpr double kRoom = 1e-6;
+    constexpr double kMargin = 1e-6;
     const auto clamped = [count](double x) {
       return static_cast<std::uint32_t>(x > 0 ? (x < count ? x : count) : 0);
     };
-    first = clamped(std::ceil(low - kRoom));
-    last = clamped(std::floor(high + kRoom) + 1);
+    first = clamped(std::ceil(low - kMargin));
+    last = clamped(std::floor(high + kMargin) + 1);
   }
 };
 
@@ -54,7 +54,7 @@ IST_HD inline LatticeRange rows_of(const LineLattice& lattice, const Corners& t)
 
 /// Lines of row j that may pierce a triangle.
 IST_HD inline LatticeRange lines_of(const LineLattice& lattice, const Corners& t, std::uint32_t j) {
-  constexpr double kRoom = 1e-12;  // above the rounding of what follows
+  constexpr double kMargin = 1e-12;  // exceeds the rounding of the following steps
   const double z = lattice.z(j);
   double low = 1e300, high = -1e300;
   for (int k = 0; k < 3; ++k) {
@@ -62,8 +62,8 @@ IST_HD inline LatticeRange lines_of(const LineLattice& lattice, const Corners& t
     const double* q = t.p[(k + 1) % 3];
     if ((p[2] > z) == (q[2] > z)) continue;
     const double y = p[1] + (z - p[2]) / (q[2] - p[2]) * (q[1] - p[1]);
-    low = y - kRoom < low ? y - kRoom : low;
-    high = y + kRoom > high ? y + kRoom : high;
+    low = y - kMargin < low ? y - kMargin : low;
+    high = y + kMargin > high ? y + kMargin : high;
   }
   if (low > high) return {0, -3, lattice.ny};
   const double first = lattice.y(0, j);
@@ -80,21 +80,21 @@ inline TriangleStrip strip_of(const LineLattice& lattice, const Corners& t) {
   return {y, z};
 }
 
-/// Whether a line of row j may lie within; cheaper than lines_of() for needles, where most have
-/// none.
+/// True if a line of row j may lie within; cheaper than lines_of() for needles, where most rows
+/// have none.
 inline bool may_meet(const TriangleStrip& strip, const LineLattice& lattice, std::uint32_t j) {
-  constexpr double kRoom = 2e-6;  // more than a LatticeRange's
+  constexpr double kMargin = 2e-6;  // exceeds that of LatticeRange
   const double at = strip.at(j) - lattice.turned(j);
-  return static_cast<double>(static_cast<std::int64_t>(at + strip.right + kRoom)) >=
-         at + strip.left - kRoom;
+  return static_cast<double>(static_cast<std::int64_t>(at + strip.right + kMargin)) >=
+         at + strip.left - kMargin;
 }
 
-/// Order of crossings along a line: by x, equal x: +1 first.
+/// Orders crossings along a line: by x; at equal x, +1 first.
 IST_HD inline bool comes_before(const Crossing& a, const Crossing& b) {
   return a.x != b.x ? a.x < b.x : a.sign > b.sign;
 }
 
-/// Where a triangle crosses line (i, j), as line_crossings() has it; sign 0: nowhere.
+/// The crossing of a triangle with line (i, j), as line_crossings() computes it; sign 0: none.
 IST_HD inline Crossing crossing_of(const LineLattice& lattice, const Corners& t, std::uint32_t i,
                                    std::uint32_t j) {
   const double yz[2] = {lattice.y(i, j), lattice.z(j)};
@@ -103,13 +103,13 @@ IST_HD inline Crossing crossing_of(const LineLattice& lattice, const Corners& t,
   return {crossing_x(t, yz), -facing};
 }
 
-/// The crossings of some rows' lines, in order, a group a line.
+/// The crossings of some rows' lines, in order, one group a line.
 using LatticeCrossings = ItemGroups<std::uint64_t, Crossing>;
 
-/// All crossings of a mesh (its arrays suffice) with a lattice: calls visit(j, crossings) for rows
-/// j and on, line (i, j + k) is group k ny + i, until all rows were visited. There are some 16
-/// million crossings at once, or those of a row; the lines of needles have billions. Runs on the
-/// caller's TBB threads.
+/// Finds all crossings of a mesh (its arrays suffice) with a lattice: calls visit(j, crossings) for
+/// rows from j on, where line (i, j + k) is group k ny + i, until all rows are visited. Stores some
+/// 16 million crossings at a time, or those of a row; the lines of needles have billions. Runs on
+/// the caller's TBB threads.
 void cross_lattice(const MeshView& mesh, const LineLattice& lattice,
                    const std::function<void(std::uint32_t, const LatticeCrossings&)>& visit);
 

@@ -8,9 +8,9 @@
 namespace ist {
 namespace {
 
-constexpr std::size_t kMost = 1024;  ///< triangles; a box around more tells little
+constexpr std::size_t kMost = 1024;  ///< triangles; a box around more excludes little
 
-/// The triangles below a child, as far as kMost + a block.
+/// Collects the triangles below a child, up to kMost + a block.
 void gather(const MeshView& mesh, std::uint32_t child, std::vector<std::uint32_t>& triangles) {
   if (child == kBvhEmpty || triangles.size() > kMost) return;
   if ((child & kBvhLeaf) != 0) {
@@ -21,7 +21,7 @@ void gather(const MeshView& mesh, std::uint32_t child, std::vector<std::uint32_t
   }
 }
 
-/// For many triangles or none the box excludes nothing.
+/// The box around many triangles or none excludes nothing.
 WideOrientedBox box_around(const MeshView& mesh, const std::vector<std::uint32_t>& triangles) {
   WideMoments moments;
   if (triangles.empty() || triangles.size() > kMost) {

@@ -6,16 +6,16 @@
 #include "mesh/geometry/exact_triangle.h"
 #include "mesh/hierarchy/wide_tree.h"
 
-// The steps of building a WideTree that concern one triangle, for host and device.
+// Steps of building a WideTree that concern one triangle, for host and device.
 
 namespace ist {
 
-/// A box in float that contains what is in it, rounding included. Empty by default.
+/// A box in float that contains its content, rounding included. Empty by default.
 struct WideBox {
   float lower[3] = {HUGE_VALF, HUGE_VALF, HUGE_VALF};
   float upper[3] = {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF};
 
-  /// Takes a point in; the box then contains its exact and its rounded coordinates.
+  /// Adds a point: the box then contains its exact and its rounded coordinates.
   IST_HD void extend(const double point[3]) {
     for (int k = 0; k < 3; ++k) {
       const float below = rounded_down(point[k]), above = rounded_up(point[k]);
@@ -38,8 +38,8 @@ IST_HD inline WideBox box_of(const Corners& corners) {
   return box;
 }
 
-/// Sums over a block's triangles that its oriented box is laid out by; the order of summing only
-/// changes how tight the box is.
+/// Sums over a block's triangles that determine its oriented box. The order of summation affects
+/// only how tight the box is.
 struct WideMoments {
   float normal[3] = {};  ///< areas times normals, twice
   float sum[3] = {};     ///< of corners, seen from `origin`
@@ -72,7 +72,7 @@ struct WideMoments {
   }
 };
 
-/// A box in directions of its own, see WideOriented. Empty by default.
+/// An oriented box, see WideOriented. Empty by default.
 struct WideOrientedBox {
   float n[3] = {1, 0, 0}, u[3] = {0, 1, 0};
   float lower[3] = {HUGE_VALF, HUGE_VALF, HUGE_VALF};
@@ -89,7 +89,7 @@ struct WideOrientedBox {
     };
     double normal[3] = {of.normal[0], of.normal[1], of.normal[2]};
     if (!scale_to_one(normal)) normal[0] = 1;
-    // Any two directions across it.
+    // Any two directions perpendicular to it.
     double a[3] = {0, -normal[2], normal[1]}, b[3];
     if (normal[0] * normal[0] > 0.5) {
       a[0] = normal[1];
@@ -148,7 +148,7 @@ struct WideOrientedBox {
   }
 };
 
-/// Writes a lane of a block; its corners are looked up in `vertices`. kNoTriangle: an empty lane.
+/// Writes a lane of a block, with corners from `vertices`. kNoTriangle: an empty lane.
 IST_HD inline void write_lane(WideBlock& block, int lane, const double* vertices,
                               std::uint32_t triangle, const std::uint32_t corner[3]) {
   TriangleFrame<double> f = absent_frame();

@@ -8,9 +8,9 @@
 #include "mesh/geometry/ray_crossing.h"
 #include "mesh/hierarchy/wide_tree.h"
 
-// Distances, winding numbers and line crossings of a WideTree, by a team (base/team.h), whose lanes
-// all ask and get the same. The answers are those of closest_point.h, exact_triangle.h and
-// winding.h, bit for bit.
+// Distances, winding numbers and line crossings of a WideTree, by a team (base/team.h). All lanes
+// pass the same arguments and get the same result. The answers are those of closest_point.h,
+// exact_triangle.h and winding.h, bit for bit.
 
 namespace ist {
 
@@ -18,14 +18,14 @@ namespace ist {
 struct WideNearest {
   float distance2 = 0;                   ///< unit frame, squared
   std::uint32_t triangle = kNoTriangle;  ///< index in the mesh, the smallest among equals
-  std::uint32_t slot = kNoSlot;          ///< where the tree keeps it
+  std::uint32_t slot = kNoSlot;          ///< its slot in the tree
 };
 
 /// Closest triangle by the double formula.
 struct WideExact {
   double distance = 0;                   ///< unit frame
   std::uint32_t triangle = kNoTriangle;  ///< index in the mesh, the smallest among equals
-  std::uint32_t slot = kNoSlot;          ///< where the tree keeps it
+  std::uint32_t slot = kNoSlot;          ///< its slot in the tree
 };
 
 IST_HD inline Corners corners_in(const WideTree& tree, const WideBlock& block, int lane) {
@@ -77,13 +77,13 @@ struct WideBall {
 };
 
 /// `kLoosely`: also visits every triangle that is no further than the closest one plus two errors,
-/// and records whether a lane saw more than one of them.
+/// and records whether a lane found more than one.
 template <class Team, bool kLoosely = false>
 struct WideNearestQuery : WideBall {
   const Team& team;
   float radius2;
   WideNearest best;         ///< of this lane
-  float runner_up = 1e30f;  ///< squared distance of the second of this lane, if any
+  float runner_up = 1e30f;  ///< squared distance of this lane's second closest, if any
 
   IST_HD WideNearestQuery(const Team& members, const WideTree& of, const float point[3],
                           float rounding, float limit2)
@@ -123,8 +123,8 @@ struct WideNearestQuery : WideBall {
   }
 };
 
-/// The closest triangle of the mesh, as nearest_triangle(). `limit2`: squared distance beyond which
-/// nothing is of interest; where no triangle is that close, distance2 = limit2 and triangle =
+/// The closest triangle of the mesh, like nearest_triangle(). `limit2`: squared distance beyond
+/// which triangles are ignored; if none is that close, distance2 = limit2 and triangle =
 /// kNoTriangle.
 template <class Team>
 IST_HD WideNearest nearest(const Team& team, const WideTree& tree, const float p[3],
@@ -143,12 +143,12 @@ struct WideWithinQuery : WideBall {
   int count = 0;
 
   IST_HD WideWithinQuery(const Team& members, const WideTree& of, const float point[3],
-                         float within2, std::uint32_t* out, int room)
+                         float within2, std::uint32_t* out, int most)
       : WideBall(of, point, distance_error_at(point), within2),
         team(members),
         radius2(within2),
         slots(out),
-        capacity(room) {}
+        capacity(most) {}
 
   IST_HD void visit(std::uint32_t index) {
     const WideBlock& block = tree.block(index);
@@ -165,9 +165,9 @@ struct WideWithinQuery : WideBall {
   }
 };
 
-/// All triangles whose float distance² from p is at most radius2: writes their slots, in no
-/// particular order, and returns how many there are. More than `capacity`: too many, and what is
-/// written means nothing. Ends with a sync of the team.
+/// Writes the slots of all triangles whose float distance² from p is at most radius2, in any order,
+/// and returns their number. If that exceeds `capacity`, the output is meaningless. Ends with a
+/// sync of the team.
 template <class Team>
 IST_HD int triangles_within(const Team& team, const WideTree& tree, const float p[3], float radius2,
                             std::uint32_t* slots, int capacity) {
@@ -201,7 +201,7 @@ struct WideExactQuery : WideBall {
     shrink(radius2);
   }
 
-  /// Takes a triangle's exact distance into account.
+  /// Includes a triangle's exact distance.
   IST_HD void look_at(std::uint32_t at) {
     const WideBlock& block = tree.block(at / kWideWidth);
     const int lane = static_cast<int>(at % kWideWidth);
@@ -237,14 +237,14 @@ struct WideExactQuery : WideBall {
   }
 };
 
-/// Closest triangle by the double formula over every triangle, as exact_closest_point(): where
+/// Closest triangle by the double formula over every triangle, like exact_closest_point(): if
 /// nothing is closer than `limit`, distance = limit and triangle = kNoTriangle.
 template <class Team>
 IST_HD WideExact exact_nearest(const Team& team, const WideTree& tree, const double p[3],
                                double limit) {
   const ExactReach reach(p);
   WideExactQuery<Team> query(team, tree, p, reach, limit * limit);
-  // The float answer first. Its traversal visits all that may be closer in double: few.
+  // The float answer first: its traversal visits the few triangles that may be closer in double.
   WideNearestQuery<Team, true> coarse(team, tree, reach.p, reach.error, query.radius2);
   traverse(team, tree, coarse);
   const float candidate2 = coarse.reach2();
@@ -257,7 +257,7 @@ IST_HD WideExact exact_nearest(const Team& team, const WideTree& tree, const dou
   return query.result(limit);
 }
 
-/// The part of a ray query that picks boxes, in no particular order.
+/// The part of a ray query that selects boxes, in any order.
 struct WideRay {
   const WideTree& tree;
   RayBox box;
@@ -312,13 +312,13 @@ struct WideLineQuery : WideRay {
   int count = 0;
 
   IST_HD WideLineQuery(const Team& members, const WideTree& of, double y, double z, double* out_x,
-                       int* out_sign, int room)
+                       int* out_sign, int most)
       : WideRay{of, RayBox::line(y, z)},
         team(members),
         yz{y, z},
         x(out_x),
         sign(out_sign),
-        capacity(room) {}
+        capacity(most) {}
 
   IST_HD void visit(std::uint32_t index) {
     const WideBlock& block = tree.block(index);
@@ -336,9 +336,9 @@ struct WideLineQuery : WideRay {
   }
 };
 
-/// All crossings of the line (·, y, z), in no particular order: writes where and with which sign
-/// (+1: the winding number rises towards +x), and returns how many there are. Beyond `capacity`
-/// none is written. Ends with a sync of the team.
+/// Writes the position and sign (+1: the winding number rises towards +x) of all crossings of the
+/// line (·, y, z), in any order, and returns their number. Those beyond `capacity` are not written.
+/// Ends with a sync of the team.
 template <class Team>
 IST_HD int line_crossings(const Team& team, const WideTree& tree, double y, double z, double* x,
                           int* sign, int capacity) {

@@ -4,11 +4,12 @@
 #include "mesh/geometry/mesh_view.h"
 #include "mesh/geometry/triangle_frame.h"
 
-// A mesh as the GPU asks it: a hierarchy without pointers, as wide as a warp, over triangles
-// ordered so that successive ones lie close together (cuda/packing/mesh/triangle_order.cu). Node 0
-// is the root and the children of node i are the nodes 32 i + 1 … 32 i + 32; from `first_leaf` on
-// the numbers mean blocks of 32 triangles. No query's answer depends on the order of the triangles,
-// so they are those of the CPU's hierarchy, bit for bit.
+// A mesh in the form that the GPU queries: a hierarchy without pointers, as wide as a warp, over
+// triangles ordered so that successive ones are close together
+// (cuda/packing/mesh/triangle_order.cu). Node 0 is the root, and the children of node i are the
+// nodes 32 i + 1 … 32 i + 32; from `first_leaf` on the numbers denote blocks of 32 triangles. No
+// answer depends on the order of the triangles, so answers equal those of the CPU's hierarchy, bit
+// for bit.
 
 namespace ist {
 
@@ -16,17 +17,17 @@ constexpr int kWideWidth = 32;
 constexpr int kWideDepth = 5;  ///< levels of nodes for 2^30 triangles
 
 /// 32 child boxes side by side, rounded outward: they contain the exact and the float vertices. The
-/// box of a child that is not there is empty: lower = ∞, upper = −∞.
+/// box of a missing child is empty: lower = ∞, upper = −∞.
 struct alignas(128) WideNode {
   float lower[3][kWideWidth];
   float upper[3][kWideWidth];
 };
 
-/// The blocks' boxes for the nodes of the last level. half = −∞ where there is no block.
+/// The blocks' boxes for the nodes of the last level. half = −∞ if there is no block.
 using WideOriented = OrientedBoxes<kWideWidth>;
 
-/// 32 triangles side by side, their frames made in double from the exact vertices and rounded once,
-/// as in TriangleBlock. Lanes beyond the last triangle lie at 1e18 and carry kNoTriangle.
+/// 32 triangle frames side by side, computed in double from the exact vertices and rounded once, as
+/// in TriangleBlock. Lanes beyond the last triangle are at 1e18 and have kNoTriangle.
 struct alignas(128) WideBlock {
   float origin[3][kWideWidth];
   float u[3][kWideWidth], v[3][kWideWidth], n[3][kWideWidth];
@@ -35,7 +36,7 @@ struct alignas(128) WideBlock {
   std::uint32_t corner[3][kWideWidth];  ///< vertex indices
 };
 
-/// Plain arrays, in the memory of whoever asks. A triangle's *slot* is 32 · block + lane.
+/// Plain arrays in host or device memory. A triangle's *slot* is 32 · block + lane.
 struct WideTree {
   const WideNode* nodes = nullptr;
   const WideOriented* oriented = nullptr;  ///< one for each node from last_level() on
@@ -61,21 +62,20 @@ struct WideTree {
 
 constexpr std::uint32_t kNoSlot = 0xFFFFFFFFu;
 
-/// Number of the first node of level `depth`, 0 being the root's.
+/// Number of the first node of level `depth`; the root's level is 0.
 IST_HD constexpr std::uint32_t first_wide_node(int depth) {
   std::uint32_t first = 0;
   for (int i = 0; i < depth; ++i) first = kWideWidth * first + 1;
   return first;
 }
 
-/// Levels of nodes over so many blocks; at least one.
+/// Number of levels of nodes over so many blocks; at least one.
 IST_HD constexpr int wide_depth(std::uint32_t block_count) {
   int depth = 1;
   for (std::uint64_t reach = kWideWidth; reach < block_count; reach *= kWideWidth) ++depth;
   return depth;
 }
 
-/// The float frame of the triangle in a slot.
 IST_HD inline TriangleFrame<float> frame_in(const WideBlock& block, int lane) {
   TriangleFrame<float> f;
   for (int k = 0; k < 3; ++k) {
@@ -99,7 +99,7 @@ IST_HD inline std::uint32_t triangle_in(const WideTree& tree, std::uint32_t slot
   return tree.block(slot / kWideWidth).triangle[slot % kWideWidth];
 }
 
-/// Which of a node's children are still to be visited: a key for each, spread over the team's
+/// The children of a node that are still to be visited: a key for each, spread over the team's
 /// lanes, with the child's number in its low five bits.
 template <class Team>
 struct WideKeys {
@@ -112,7 +112,7 @@ struct WideKeys {
     key[i] = (urgency & ~kChild) | static_cast<std::uint32_t>(team.lane() + i * Team::kWidth);
   }
 
-  /// The least key, now visited; kVisited if none is below the limit.
+  /// Returns the least key and marks it as visited; kVisited if none is below the limit.
   IST_HD std::uint32_t take_first(const Team& team, std::uint32_t limit) {
     std::uint32_t first = kVisited;
     for (int i = 0; i < kEach; ++i) first = key[i] < first ? key[i] : first;
@@ -124,12 +124,14 @@ struct WideKeys {
   }
 };
 
-/// Walks down the tree, all lanes of the team together, nearest children first. The query says
-///   key(node, child)  the child's place in line; its low five bits are ignored
-///   limit()           keys that are not below it are left out; the same in all lanes
+/// Descends the tree, nearest children first, with all lanes of the team together. The query
+/// provides
+///   key(node, child)  the child's position in the order; its low five bits are ignored
+///   limit()           keys that are not below it are skipped; the same in all lanes
 ///   visit(block)      called with the index of a block of triangles; may lower the limit, 0 ends
-/// The path down is kept in registers: a visit costs one dependent load a level. (Blocks in pairs,
-/// so that their loads overlap, make one query alone 15 % faster and many at once 20 % slower.)
+/// The path is kept in registers: a visit costs one dependent load a level. (Visiting blocks in
+/// pairs, so that their loads overlap, makes a single query 15 % faster and many at once 20 %
+/// slower.)
 template <class Team, class Query>
 IST_HD void traverse(const Team& team, const WideTree& tree, Query&& query) {
   using Keys = WideKeys<Team>;
@@ -140,7 +142,7 @@ IST_HD void traverse(const Team& team, const WideTree& tree, Query&& query) {
     here.set(team, i, query.key(0, team.lane() + i * Team::kWidth));
   for (;;) {
     const std::uint32_t first = here.take_first(team, query.limit());
-    if (first == Keys::kVisited) {  // nothing left here
+    if (first == Keys::kVisited) {  // nothing left at this node
       if (node == 0) return;
       node = (node - 1) / kWideWidth;
       here = above[0];

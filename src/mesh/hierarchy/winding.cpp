@@ -13,7 +13,7 @@
 namespace ist {
 namespace {
 
-/// Clears hit[i] where, seen along x, oriented box i is apart from a box.
+/// Clears hit[i] if oriented box i is apart from a box, seen along x.
 void leave_out_apart(const OrientedBoxes<kBvhWidth>& boxes, const float low[3], const float high[3],
                      int hit[kBvhWidth]) {
   const float y = (low[1] + high[1]) / 2, z = (low[2] + high[2]) / 2;
@@ -27,7 +27,7 @@ void leave_out_apart(const OrientedBoxes<kBvhWidth>& boxes, const float low[3], 
       centre_y += middle * axis[k][1];
       centre_z += middle * axis[k][2];
     }
-    // Across each of the box's edges, as they are seen.
+    // Tests the directions perpendicular to each of the box's edges, in projection.
     for (int k = 0; k < 3; ++k) {
       const FloatLanes across_y = -axis[k][2], across_z = axis[k][1];
       FloatLanes reach =
@@ -70,7 +70,7 @@ void visit_about_box(const MeshView& mesh, const float low[3], const float high[
   }
 }
 
-/// Lines (y, z) by the square cells that they lie in, as many cells as lines.
+/// Lines (y, z) grouped by square cells, as many cells as lines.
 class LinesInCells {
  public:
   explicit LinesInCells(const std::vector<std::array<double, 2>>& lines)
@@ -92,7 +92,7 @@ class LinesInCells {
   }
 
  private:
-  /// Never falls as the coordinate grows.
+  /// Monotone in the coordinate.
   std::size_t cell_of(double x) const {
     const auto n = static_cast<double>(cells_);
     return static_cast<std::size_t>(std::clamp((x + 1) / 2 * n, 0.0, n - 1));

@@ -23,8 +23,8 @@ HWY_INLINE Vector dot(const Vector a[3], const Vector b[3]) {
   return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
 }
 
-/// Winding numbers of eight points. Angles are multiplied, as complex numbers, and the turns are
-/// counted that their product makes: an arc tangent costs more than all else.
+/// Winding numbers of eight points. Angles are multiplied as complex numbers, and the turns of the
+/// product are counted: an arc tangent would cost more than everything else.
 class Winding {
  public:
   explicit Winding(const double points[3][kWindingPoints]) {
@@ -35,7 +35,7 @@ class Winding {
     }
   }
 
-  /// Half the signed solid angle, positive where a point sees the back (van Oosterom & Strackee).
+  /// Half the signed solid angle, positive if a point sees the back (van Oosterom & Strackee).
   void add(const Corners& t) {
     const Tag d;
     for (std::size_t i = 0; i < kWindingPoints; i += hn::Lanes(d)) {
@@ -66,7 +66,7 @@ class Winding {
     }
   }
 
-  /// After a few triangles: else products leave the range of double.
+  /// Normalises the product after a few triangles, before it leaves the range of double.
   void shorten() {
     const Tag d;
     for (std::size_t i = 0; i < kWindingPoints; i += hn::Lanes(d)) {
@@ -79,7 +79,8 @@ class Winding {
     }
   }
 
-  /// Adds what all points see from afar; false, and nothing, where one is too near.
+  /// Adds the far-field expansion of a group; adds nothing and returns false if a point is too
+  /// near.
   bool add(const FarTriangles& seen) {
     const Tag d;
     alignas(64) double angles[kWindingPoints];
@@ -109,9 +110,9 @@ class Winding {
 
  private:
   alignas(64) double points_[3][kWindingPoints];
-  alignas(64) double re_[kWindingPoints], im_[kWindingPoints];  ///< of the product
-  alignas(64) double turns_[kWindingPoints];                    ///< that it made
-  double far_[kWindingPoints];                                  ///< solid angles
+  alignas(64) double re_[kWindingPoints], im_[kWindingPoints];  ///< the product
+  alignas(64) double turns_[kWindingPoints];                    ///< its turns so far
+  double far_[kWindingPoints];                                  ///< solid angles of far groups
 };
 
 void wind_about(const MeshView& mesh, const FarChildren* far,

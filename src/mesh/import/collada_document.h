@@ -29,8 +29,8 @@ class ColladaDocument {
   std::vector<double> reals(Index element, std::size_t count) const;
   std::vector<std::uint64_t> wholes(Index element) const;
 
-  /// The most corners or numbers that one file may expand to: a small file can instance its meshes
-  /// many times, and more than this is no accident.
+  /// A limit on the corners or numbers that a file may expand to: a small file can instance its
+  /// meshes many times, but more than this is malicious or damaged.
   std::size_t most() const { return most_; }
 
  private:
@@ -39,12 +39,11 @@ class ColladaDocument {
   std::unordered_map<std::string_view, Index> by_id_;
 };
 
-/// Reads the faces of <geometry> elements.
 class ColladaGeometries {
  public:
   explicit ColladaGeometries(const ColladaDocument& document) : document_(document) {}
 
-  /// In its own frame; read once, however often it is asked for.
+  /// Returns a geometry in its own frame; reads it only once.
   const PolygonMesh& operator[](std::uint32_t geometry);
 
  private:

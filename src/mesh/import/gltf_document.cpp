@@ -23,8 +23,8 @@ bool starts_with_any(std::string_view text, const std::array<std::string_view, C
                      [&](std::string_view start) { return text.starts_with(start); });
 }
 
-/// Extensions that change how a surface looks, not where it is; and those that are read: integer
-/// coordinates, like any others, and instances.
+/// Extensions that change the appearance of a surface, not its shape; and those that are supported:
+/// integer coordinates and instances.
 bool is_harmless(std::string_view extension) {
   constexpr std::array<std::string_view, 6> kHarmless{
       "KHR_mesh_quantization", "EXT_mesh_gpu_instancing",
@@ -33,7 +33,7 @@ bool is_harmless(std::string_view extension) {
   return starts_with_any(extension, kHarmless);
 }
 
-/// Where it is not required, a file contains the same numbers without it.
+/// Unless it is required, the file contains the same numbers uncompressed.
 bool is_compression(std::string_view extension) {
   constexpr std::array<std::string_view, 3> kCompressions{
       "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"};
@@ -61,7 +61,7 @@ std::optional<std::string> decode_base64(std::string_view text) {
 
 struct ComponentType {
   std::size_t code, bytes;
-  double largest;  ///< what 1.0 is stored as, if normalized
+  double largest;  ///< the integer that represents 1.0, if normalized
   double (*read)(const char*);
 };
 
@@ -298,7 +298,7 @@ std::vector<double> GltfDocument::accessor(std::size_t index, std::string_view t
   if (accessor.contains("bufferView")) {
     values = numbers(accessor, accessor, type, count, name);
   } else {
-    // Adds no more zeros than the file has bytes: other attributes of as many vertices take more.
+    // Adds no more zeros than the file has bytes: other attributes of the vertices take more.
     std::size_t stored = file_.bytes.size();
     for (const std::string_view buffer : buffers_) stored += buffer.size();
     if (count > stored) fail(name + ": " + std::to_string(count) + " elements without data");

@@ -12,7 +12,7 @@ struct PolygonMesh {
   std::vector<Eigen::Vector3d> vertices;  ///< [u]
   std::vector<std::uint32_t> corners;     ///< of all polygons, one after the other
   std::vector<std::size_t> ends;          ///< polygon i ends before corners[ends[i]]
-  /// In place of both where a reader finds nothing but triangles.
+  /// Replaces both if a reader finds only triangles.
   std::vector<std::array<std::uint32_t, 3>> triangles;
   /// Text files only: the line of each vertex that is not finite.
   std::map<std::uint32_t, std::size_t> line_of_nonfinite;
@@ -25,27 +25,27 @@ struct PolygonMesh {
   }
 };
 
-/// Readers of this library. Coordinates in double, every index and count checked. Each throws Error
-/// that names the file and the line, byte or element.
+/// This library's own readers. Coordinates are double, every index and count is checked. Each
+/// throws an Error that names the file and the line, byte or element.
 PolygonMesh read_obj(const SourceFile& file);
 PolygonMesh read_stl(const SourceFile& file);
 PolygonMesh read_ply(const SourceFile& file);
 PolygonMesh read_off(const SourceFile& file);
 
-/// glTF 2.0: the default scene with its node transforms, instances, skins where their joints stand
-/// and morph targets by the default weights.
+/// glTF 2.0: the default scene with its node transforms, instances, skins in the pose of their
+/// joints, and morph targets by the default weights.
 PolygonMesh read_gltf(const SourceFile& file);
 
-/// The same, node by node: meshes in their own frames, shared by the nodes that show them.
+/// The same, node by node: meshes in their own frames, shared by the nodes that instance them.
 struct GltfParts {
   struct Part {
-    std::string name;          ///< the node's; of several instances numbered
+    std::string name;          ///< the node's; numbered for several instances
     std::size_t mesh = 0;      ///< index into `meshes`
     Eigen::Affine3d in_world;  ///< it may mirror and shear
   };
   std::vector<PolygonMesh> meshes;
   std::vector<Part> parts;  ///< in the order of the scene
-  bool of_doubles = false;  ///< some number of its nodes is no float32, and no decimal of one
+  bool of_doubles = false;  ///< some number of its nodes is neither a float32 nor a decimal of one
   std::vector<std::string> notes;
 };
 GltfParts read_gltf_parts(const SourceFile& file);
@@ -58,8 +58,8 @@ PolygonMesh read_collada(const SourceFile& file);
 /// axes. Coordinates pass through float.
 PolygonMesh read_with_assimp(const SourceFile& file);
 
-/// Polygons into triangles: a fan where it is valid, else ears cut off in the polygon's own plane
-/// (Newell normal), so that concave polygons come out right. Triangles are moved out of the mesh.
+/// Triangulates polygons: a fan where it is valid, else by ear clipping in the polygon's plane
+/// (Newell normal), so that concave polygons are correct. Triangles are moved out of the mesh.
 std::vector<std::array<std::uint32_t, 3>> triangulate(PolygonMesh& mesh);
 
 /// Appends the triangles of one polygon of three or more corners.

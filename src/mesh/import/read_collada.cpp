@@ -15,7 +15,8 @@ namespace {
 using Transform = Eigen::Affine3d;
 using Index = ColladaDocument::Index;
 
-/// Sine and cosine of degrees by + − × ÷ alone: alike on every machine; exact at multiples of 90°.
+/// Sine and cosine of degrees by + − × ÷ alone: the same on every machine; exact at multiples of
+/// 90°.
 std::pair<double, double> sine_and_cosine(double degrees) {
   const double turned = std::fmod(degrees, 360.0);  // exact
   const double quarter = std::round(turned / 90);
@@ -89,8 +90,8 @@ class SceneReader {
     return first;
   }
 
-  /// Reads <asset>. What is up there is reported and no coordinate turned by it: a robot's visual
-  /// DAE has to stand as its collision STL does.
+  /// Reads <asset>. The up axis is reported, but coordinates are not rotated by it: a robot's
+  /// visual DAE must match its collision STL.
   DeclaredFrame declared_frame() const {
     DeclaredFrame frame;
     const Index asset = xml_.child(0, "asset");
@@ -108,7 +109,7 @@ class SceneReader {
     return frame;
   }
 
-  /// Metres.
+  /// The scale to metres.
   Transform root_transform() const {
     Transform transform = Transform::Identity();
     if (out_.declared.unit != 0) transform.linear() *= out_.declared.unit;
@@ -162,7 +163,7 @@ class SceneReader {
     return Eigen::Matrix3d::Identity() + sine * cross + (1 - cosine) * cross * cross;  // Rodrigues
   }
 
-  /// A skinned mesh in its bind pose stands where its skin says, not its node.
+  /// Appends a skinned mesh in its bind pose, which its skin places, not its node.
   void append_controller(Index instance, const Transform& world) {
     const Index controller = document_.target(instance, "url", "controller");
     const auto [found, is_new] = controllers_.try_emplace(controller);
@@ -196,7 +197,7 @@ class SceneReader {
                               " corners. Flatten or split the scene");
     const auto first = static_cast<Index>(out_.vertices.size());
     for (const Eigen::Vector3d& v : mesh.vertices) out_.vertices.push_back(world * v);
-    // A mirror turns every face inside out; turn it back.
+    // A mirror turns every face inside out; this reverses it.
     const bool mirrored = world.linear().determinant() < 0;
     std::size_t begin = 0;
     for (const std::size_t end : mesh.ends) {
@@ -207,7 +208,8 @@ class SceneReader {
     }
   }
 
-  /// A small file can ask for many copies of its nodes: more than this is no accident.
+  /// A limit of instances: a small file can instance its nodes many times, but more is malicious or
+  /// damaged.
   static constexpr std::size_t kMostInstances = 1'000'000;
 
   struct Controlled {

@@ -24,7 +24,7 @@ Transform placed(const GltfDocument& document, const double* t, const double* r,
   return transform;
 }
 
-/// From 16 numbers by columns.
+/// Makes a transform from 16 numbers by columns.
 Transform affine(const GltfDocument& document, const double* m, const std::string& name) {
   if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1)
     document.fail(name + ": its matrix is a projection, not a transform");
@@ -55,7 +55,8 @@ Transform local_transform(const GltfDocument& document, const Json& node, const 
   return placed(document, t.data(), r.data(), s.data(), name);
 }
 
-/// More digits than a float32 has when it is written as a decimal or as the double it is.
+/// True if a number has more digits than a float32, whether written as a decimal or as its exact
+/// double.
 bool is_certainly_double(double x) {
   char text[32];
   const auto end = std::to_chars(text, text + sizeof text, x, std::chars_format::general, 9).ptr;
@@ -64,8 +65,8 @@ bool is_certainly_double(double x) {
   return rounded != x && static_cast<double>(static_cast<float>(x)) != x;
 }
 
-/// Where EXT_mesh_gpu_instancing puts copies of a node's mesh, in the node's frame; without it,
-/// one copy where the node stands.
+/// The copies of a node's mesh by EXT_mesh_gpu_instancing, in the node's frame; without it, one
+/// identity transform.
 std::vector<Transform> instances(const GltfDocument& document, const Json& node,
                                  const std::string& name) {
   constexpr const char* kExtension = "EXT_mesh_gpu_instancing";
@@ -112,7 +113,7 @@ std::vector<std::uint32_t> corner_indices(const GltfDocument& document, const Js
   return indices;
 }
 
-/// A primitive where its vertices stand before the node places them.
+/// A primitive in the node's frame.
 struct Primitive {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
@@ -146,7 +147,7 @@ Primitive read_primitive(const GltfDocument& document, const Json& json, const s
   return primitive;
 }
 
-/// Moves vertices by Σ weight · morph target. The node's weights come before its mesh's.
+/// Moves vertices by Σ weight · morph target. The node's weights override its mesh's.
 void morph(const GltfDocument& document, const Json& json, const std::vector<double>& weights,
            const std::string& name, Primitive& primitive) {
   if (!json.contains("targets") || weights.empty()) return;
@@ -167,11 +168,11 @@ void morph(const GltfDocument& document, const Json& json, const std::vector<dou
   }
 }
 
-/// Turns a mirrored triangle's face back out.
+/// Reverses a triangle of a mirrored face.
 void turn(std::array<std::uint32_t, 3>& triangle) { std::swap(triangle[1], triangle[2]); }
 
-/// Moves vertices to where their joints take them: Σ weight · joint. A vertex's joints are summed
-/// by their number, so that copies of it at a seam, which may list them otherwise, stay together.
+/// Moves vertices by their joints: Σ weight · joint. A vertex's joints are summed in order of their
+/// numbers, so that its copies at a seam, which may list them in another order, stay together.
 void pose(const GltfDocument& document, const Json& json, const std::vector<Transform>& joints,
           const std::string& name, Primitive& primitive) {
   using Weight = std::pair<std::size_t, double>;  // by joint
@@ -238,7 +239,7 @@ std::vector<std::size_t> root_nodes(const GltfDocument& document) {
     const Json& scene = document.at("scenes", document.whole(root, "scene", 0), "the file");
     return document.whole_list(scene, "nodes");
   }
-  // Without a scene: every node that is no child.
+  // Without a scene: every node that is not a child.
   const Json nodes = root.value("nodes", Json::array());
   std::vector<bool> is_child(nodes.size(), false);
   for (const Json& node : nodes)
@@ -295,7 +296,7 @@ class GltfScene {
     return document_.root().at("nodes")[index].contains("mesh");
   }
 
-  /// The nodes of the scene, each after its parent, with their frames.
+  /// Computes the frames of the scene's nodes, each after its parent.
   void place_nodes() {
     worlds_.resize(document_.root().value("nodes", Json::array()).size());
     std::vector<std::pair<std::size_t, Transform>> open;
@@ -321,7 +322,7 @@ class GltfScene {
     }
   }
 
-  /// Where a node's mesh stands, all its instances; the joints place a skinned one.
+  /// The world transforms of all instances of a node's mesh; the joints place a skinned one.
   std::vector<Transform> world_places(std::size_t index) const {
     const Json& node = document_.root().at("nodes")[index];
     std::vector<Transform> places = instances(document_, node, "node " + std::to_string(index));
@@ -352,7 +353,7 @@ class GltfScene {
     }
   }
 
-  /// From the frame in which the skin was modelled to where each of its joints stands.
+  /// The transforms from the frame in which the skin was modelled to each joint's place.
   std::vector<Transform> joints_of(std::size_t index, const std::string& from) const {
     const std::string name = "skin " + std::to_string(index);
     const Json& skin = document_.at("skins", index, from);
@@ -394,7 +395,7 @@ class GltfScene {
 
 }  // namespace
 
-/// `read` of a scene; what the JSON library says becomes an Error.
+/// Calls `read` for a scene; exceptions of the JSON library become an Error.
 template <class Read>
 static auto of_scene(const SourceFile& file, Read read) {
   try {

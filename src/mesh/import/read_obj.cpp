@@ -6,12 +6,12 @@
 namespace ist {
 namespace {
 
-/// The vertex of a corner "v", "v/vt", "v//vn" or "v/vt/vn": counted from 1, or back from −1.
+/// The vertex of a corner "v", "v/vt", "v//vn" or "v/vt/vn": counted from 1, or backwards from −1.
 std::int64_t vertex_of_corner(const TextScanner& scanner, std::string_view corner) {
   return scanner.integer(corner.substr(0, corner.find('/')));
 }
 
-/// Statements other than `f` that make or fetch a surface.
+/// Statements other than `f` that define or include a surface.
 bool is_surface(std::string_view keyword) {
   return keyword == "surf" || keyword == "bsp" || keyword == "bzp" || keyword == "cdp" ||
          keyword == "call";
@@ -19,7 +19,8 @@ bool is_surface(std::string_view keyword) {
 
 }  // namespace
 
-/// Wavefront OBJ: `v` and `f`, with backslashes at line ends. Notes other surfaces, skips all else.
+/// Wavefront OBJ: `v` and `f`, with backslashes at line ends. Reports other surfaces in notes,
+/// skips the rest.
 PolygonMesh read_obj(const SourceFile& file) {
   if (file.bytes.find('\0') != std::string::npos)
     fail(file, "holds binary data, so it is not an OBJ file. Give it the ending of its format");

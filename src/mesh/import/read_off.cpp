@@ -5,7 +5,7 @@
 namespace ist {
 namespace {
 
-/// Lines that contain anything but comment, from here to the end.
+/// Counts the lines from here to the end that contain more than a comment.
 std::size_t count_lines_with_words(TextScanner scanner) {
   std::size_t count = 0;
   while (scanner.next_line()) count += scanner.word().empty() ? 0 : 1;
@@ -37,8 +37,8 @@ PolygonMesh read_off(const SourceFile& file) {
   const std::size_t vertex_count = read_count(scanner, "vertices", 6);  // "0 0 0\n"
   const std::size_t face_count = read_count(scanner, "faces", 4);       // "1 0\n"
   scanner.word();                                                       // edges, often 0 or missing
-  // A line a record: what follows the coordinates or the corners is colour and the like. Files that
-  // break lines elsewhere can have no such extras.
+  // One line a record: colours and the like may follow the coordinates or the corners. Files with
+  // other line breaks cannot have such extras.
   const bool line_a_record = count_lines_with_words(scanner) >= vertex_count + face_count;
 
   PolygonMesh mesh;

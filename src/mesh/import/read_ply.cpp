@@ -118,7 +118,7 @@ Header parse_header(const SourceFile& file) {
   fail(file, "the file ends early: the header has no end_header");
 }
 
-/// The values after the header, one after the other, whatever their encoding.
+/// The values after the header, in order, whatever their encoding.
 class Body {
  public:
   Body(const SourceFile& file, const Header& header)
@@ -139,7 +139,7 @@ class Body {
     return value;
   }
 
-  /// A value of a binary file that lies whole within it.
+  /// A value of a binary file, which must lie within the file.
   double value_at(std::size_t position, const NumberType& type) const {
     return type.read(file_.bytes.data() + position, encoding_);
   }
@@ -159,7 +159,8 @@ class Body {
       fail_here("the file ends early: it is too short for " + std::to_string(count) + " × " + what);
   }
 
-  /// A value takes at least this much of the file. (Text: a digit and a space, the last one aside.)
+  /// The minimum size of a value in the file. (Text: a digit and a space, except for the last
+  /// value.)
   std::size_t least_bytes(const NumberType& type) const {
     return encoding_ == Encoding::ascii ? 1 : type.size;
   }
@@ -170,8 +171,8 @@ class Body {
     return sum;
   }
 
-  /// Where so many records of a binary file begin, which are then passed over; nothing in a text or
-  /// where the file is too short for them.
+  /// Skips so many records of a binary file and returns where they begin; nothing for a text file
+  /// or if the file is too short.
   std::optional<std::size_t> pass_records(std::uint64_t count, std::size_t bytes) {
     if (is_text() || count > (file_.bytes.size() - position_) / bytes) return std::nullopt;
     return std::exchange(position_, position_ + count * bytes);
@@ -194,7 +195,7 @@ class Body {
 };
 
 void read_vertices(Body& body, const Element& element, PolygonMesh& mesh) {
-  // Where x, y and z stand among the properties.
+  // The axis of each property: x, y, z, or −1.
   std::vector<int> axis_of(element.properties.size(), -1);
   std::array<bool, 3> found{};
   for (std::size_t p = 0; p < element.properties.size(); ++p) {
@@ -245,8 +246,8 @@ bool is_corners(const Property& property) {
   return property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index");
 }
 
-/// Faces of a binary file that has nothing but triangles, all of them sound: records of one size.
-/// False, and nothing is read, where it is otherwise.
+/// Reads the faces of a binary file that contains only valid triangles: records of one size.
+/// Otherwise reads nothing and returns false.
 bool read_triangles(Body& body, const Element& element, std::uint64_t vertex_count,
                     PolygonMesh& mesh) {
   if (body.is_text() || element.properties.size() != 1 || !is_corners(element.properties[0]))
@@ -276,7 +277,7 @@ bool read_triangles(Body& body, const Element& element, std::uint64_t vertex_cou
   return true;
 }
 
-/// Throws Error unless the value counts a vertex.
+/// Throws Error unless the value is the index of a vertex.
 std::uint32_t vertex_of(const Body& body, double value, std::uint64_t vertex_count,
                         const char* of_what, std::uint64_t index, std::uint64_t corner) {
   if (!(value >= 0) || value >= static_cast<double>(vertex_count) || value != std::floor(value))
@@ -286,7 +287,7 @@ std::uint32_t vertex_of(const Body& body, double value, std::uint64_t vertex_cou
   return static_cast<std::uint32_t>(value);
 }
 
-/// Strips of triangles, each turned against the one before; −1 ends one.
+/// Strips of triangles with alternating orientation; −1 ends one.
 void read_strips(Body& body, const Element& element, std::uint64_t vertex_count,
                  PolygonMesh& mesh) {
   for (std::uint64_t i = 0; i < element.count; ++i) {
@@ -310,7 +311,7 @@ void read_strips(Body& body, const Element& element, std::uint64_t vertex_count,
 }
 
 void read_faces(Body& body, const Element& element, std::uint64_t vertex_count, PolygonMesh& mesh) {
-  if (element.properties.empty()) return;  // any number of nothing
+  if (element.properties.empty()) return;  // empty records of any number
   if (read_triangles(body, element, vertex_count, mesh)) return;
   mesh.ends.reserve(element.count);
   mesh.corners.reserve(3 * element.count);
@@ -344,8 +345,8 @@ void skip(Body& body, const Element& element) {
 
 }  // namespace
 
-/// Polygon file format, text or binary of either byte order; elements other than vertices, faces
-/// and strips and properties other than position and corners are passed over.
+/// Polygon file format, text or binary of either byte order. Skips elements other than vertices,
+/// faces and strips, and properties other than position and corners.
 PolygonMesh read_ply(const SourceFile& file) {
   const Header header = parse_header(file);
   std::uint64_t vertex_count = 0;
@@ -372,7 +373,7 @@ PolygonMesh read_ply(const SourceFile& file) {
     }
   }
   if (!mesh.triangles.empty() &&
-      !mesh.ends.empty()) {  // faces alone were triangles, strips came too
+      !mesh.ends.empty()) {  // some faces were read as triangles, and strips follow
     for (const auto& t : mesh.triangles) mesh.add_triangle(t[0], t[1], t[2]);
     mesh.triangles.clear();
   }

@@ -19,7 +19,7 @@ std::uint64_t triangles_announced(const SourceFile& file) {
   return count;
 }
 
-/// Whether the count in a binary file's header fits its size.
+/// True if the count in a binary file's header matches its size.
 bool has_binary_size(const SourceFile& file) {
   return file.bytes.size() >= kHeaderBytes &&
          kHeaderBytes + kFacetBytes * triangles_announced(file) == file.bytes.size();
@@ -85,7 +85,7 @@ PolygonMesh read_text(const SourceFile& file) {
     for (word = next(); !same_letters(word, "endsolid"); word = next()) {
       expect(word, "facet");
       expect(next(), "normal");
-      for (int k = 0; k < 3; ++k) next();  // implied by the corners, and often wrong
+      for (int k = 0; k < 3; ++k) next();  // the normal is implied by the corners, and often wrong
       expect(next(), "outer");
       expect(next(), "loop");
       const auto first = static_cast<std::uint32_t>(mesh.vertices.size());

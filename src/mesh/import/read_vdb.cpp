@@ -68,7 +68,7 @@ LevelSetMesh read_level_set(const std::string& path, const ProgressCallback& pro
   openvdb::initialize();
   const FloatGrid::Ptr grid = level_set_of(only_grid(path), path);
   LevelSetMesh found = mesh_level_set(dense_values(*grid, path), path, progress);
-  // From voxels to the world, where a length grows to that of the matrix's entries at most.
+  // Maps voxels to the world; the transform scales lengths by at most the matrix's entries.
   const openvdb::math::Transform& place = grid->transform();
   TriangleMesh mesh = std::move(found.mesh.mesh);
   for (Eigen::Vector3d& v : mesh.vertices) {

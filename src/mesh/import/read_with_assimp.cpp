@@ -31,7 +31,7 @@ void append(const aiMesh& mesh, const AssimpTransform& world, PolygonMesh& out) 
     const aiVector3D& v = mesh.mVertices[i];
     out.vertices.push_back((world * Eigen::Vector4d(v.x, v.y, v.z, 1)).head<3>());
   }
-  // A mirror turns every face inside out; turn it back.
+  // A mirror turns every face inside out; this reverses it.
   const bool mirrored = world.topLeftCorner<3, 3>().determinant() < 0;
   for (unsigned i = 0; i < mesh.mNumFaces; ++i) {
     const aiFace& face = mesh.mFaces[i];
@@ -44,7 +44,7 @@ void append(const aiMesh& mesh, const AssimpTransform& world, PolygonMesh& out) 
   }
 }
 
-/// assimp turns the z axis of these formats to y in front of the scene; this turns it back.
+/// assimp rotates the z axis of these formats to y at the scene's root; this undoes it.
 AssimpTransform own_axes(const std::string& ending) {
   constexpr std::array<std::string_view, 10> kTurned = {".3ds", ".prj", ".ase", ".ask",     ".dxf",
                                                         ".iqm", ".md2", ".md3", ".md5mesh", ".mdc"};
@@ -54,8 +54,8 @@ AssimpTransform own_axes(const std::string& ending) {
   return back;
 }
 
-/// FBX files say which axis is up and how many centimetres a unit has. assimp reports both and
-/// converts neither.
+/// FBX files declare the up axis and the centimetres of a unit. assimp reports both and converts
+/// neither.
 DeclaredFrame declared_frame(const aiScene& scene) {
   DeclaredFrame frame;
   if (scene.mMetaData == nullptr) return frame;
@@ -72,12 +72,12 @@ DeclaredFrame declared_frame(const aiScene& scene) {
 PolygonMesh read_with_assimp(const SourceFile& file) {
   Assimp::Importer importer;
   const std::string ending = ending_of(file.path);
-  if (ending == ".step" || ending == ".stp")  // assimp takes them for IFC
+  if (ending == ".step" || ending == ".stp")  // assimp takes them for IFC files
     fail(file, "a STEP file has no triangles. Make a GLB of it, as cascadio does");
   if (ending.empty() || !importer.IsExtensionSupported(ending))
     fail(file, "no mesh format ends in " + in_quotes(ending) +
                    ". Known are obj, stl, ply, off, glb, gltf, dae and what assimp reads");
-  // ValidateDataStructure: indices within range, whatever the file said.
+  // ValidateDataStructure: indices are then in range, whatever the file contains.
   const aiScene* const scene = importer.ReadFile(file.path, aiProcess_ValidateDataStructure);
   if (scene == nullptr || scene->mRootNode == nullptr)
     fail(file, "cannot be read as a mesh: " + std::string(importer.GetErrorString()));

@@ -31,7 +31,7 @@ std::string lower_case(std::string text) {
   return text;
 }
 
-/// How files of a mesh format begin, and what they are named.
+/// The first bytes of a mesh format, and its name.
 struct MeshSignature {
   std::string_view start, meaning, endings;
 };

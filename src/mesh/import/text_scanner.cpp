@@ -19,7 +19,7 @@ std::string_view without_plus(std::string_view word) {
 TextScanner::TextScanner(const SourceFile& file, char comment, std::size_t start, std::size_t line)
     : file_(file), text_(file.bytes), position_(start), line_number_(line - 1), comment_(comment) {
   if (start == 0) position_ = text_.size() - without_byte_order_mark(text_).size();
-  // All lines end like the first: in old files with a carriage return alone.
+  // All lines end like the first; old files have only carriage returns.
   const std::size_t end = text_.find_first_of("\r\n");
   const std::size_t beyond = text_.find_first_not_of('\r', end);
   if (end != beyond && (beyond == std::string_view::npos || text_[beyond] != '\n')) end_ = '\r';
@@ -83,7 +83,8 @@ std::optional<double> parse_real(std::string_view word) {
   if (end != last) return std::nullopt;
   if (error == std::errc()) return value;
   if (error != std::errc::result_out_of_range) return std::nullopt;
-  // from_chars does not tell too large from too small. The exponent does, for usual mantissas.
+  // from_chars does not distinguish overflow from underflow. The exponent does, for usual
+  // mantissas.
   const std::size_t exponent = digits.find_first_of("eE");
   const bool tiny = exponent != std::string_view::npos && digits.substr(exponent + 1, 1) == "-";
   if (tiny) return 0.0;

@@ -9,8 +9,8 @@
 
 namespace ist {
 
-/// Words of a text file, line by line, with the line number for messages. Numbers are read in the
-/// C locale whatever the process has set.
+/// Words of a text file, line by line, with the line number for messages. Numbers are read in the C
+/// locale, whatever the process's locale.
 class TextScanner {
  public:
   /// Text from byte `start` of the file on, whose first line is number `line`. Everything from
@@ -41,7 +41,7 @@ class TextScanner {
   char end_ = '\n';  ///< of a line
 };
 
-/// Calls visit(word) for every word of a text, which blanks and ends of lines keep apart.
+/// Calls visit(word) for every word of a text, separated by blanks and line ends.
 template <class Visit>
 void for_words(std::string_view text, const Visit& visit) {
   constexpr std::string_view kSpace = " \t\r\n";
@@ -52,7 +52,7 @@ void for_words(std::string_view text, const Visit& visit) {
   }
 }
 
-/// All of a text as a number, whose digits are decimal, or nothing.
+/// Parses a whole text as a decimal number, or returns nothing.
 template <class T>
 std::optional<T> parse_whole(std::string_view text) {
   T value = 0;
@@ -61,7 +61,7 @@ std::optional<T> parse_whole(std::string_view text) {
   return value;
 }
 
-/// The whole word as a number, or nothing. What is too large for double is infinite, too small 0.
+/// Parses a whole word as a number, or returns nothing. Overflow gives infinity, underflow 0.
 std::optional<double> parse_real(std::string_view word);
 
 }  // namespace ist

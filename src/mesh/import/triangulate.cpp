@@ -27,7 +27,7 @@ double roundness(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen
   return sides > 0 ? turn(a, b, c, normal) / (sides * normal.norm()) : 0;
 }
 
-/// Takes the square of the number of corners, whatever the polygon.
+/// Clips ears in quadratic time, whatever the polygon.
 class EarClipper {
  public:
   EarClipper(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& normal)
@@ -36,8 +36,9 @@ class EarClipper {
     for (std::size_t i = 0; i < left_.size(); ++i) look_at(i);
   }
 
-  /// Cuts the best ear until a triangle is left. Where the polygon crosses itself no proper ear may
-  /// remain: then the least bad corner goes, so that every side of the polygon keeps its triangle.
+  /// Cuts the best ear until a triangle is left. If the polygon intersects itself, no proper ear
+  /// may remain: then the least bad corner is cut, so that every side of the polygon keeps its
+  /// triangle.
   template <class Emit>
   void clip(const Emit& emit) {
     while (left_.size() > 3) {
@@ -72,7 +73,7 @@ class EarClipper {
     return corner.blocked_by == kNobody ? corner.roundness : corner.roundness - 1;
   }
 
-  /// The corner at place i has new neighbours.
+  /// Updates the corner at index i, whose neighbours have changed.
   void look_at(std::size_t i) {
     const std::size_t n = left_.size(), k = left_[i];
     Corner& corner = corners_[k];
@@ -84,7 +85,8 @@ class EarClipper {
     if (corner.roundness > 0) find_blocker(k);
   }
 
-  /// Points before the blocker that was cut do not lie in the ear, so it goes on from there.
+  /// Points before a blocker that was cut do not lie in the ear, so the search continues from
+  /// there.
   void find_blocker(std::size_t k) {
     Corner& corner = corners_[k];
     const Eigen::Vector3d &a = points_[corner.before], &b = points_[k], &c = points_[corner.after];
@@ -121,9 +123,9 @@ void triangulate_polygon(const std::vector<Eigen::Vector3d>& vertices, const std
   bool fan_is_valid = true;
   for (std::size_t i = 1; fan_is_valid && i + 1 < count; ++i)
     fan_is_valid = turn(points[0], points[i], points[i + 1], normal) > 0;
-  // Without a normal (a flat or unreadable polygon) any diagonal is as good.
+  // Without a normal (a flat or unreadable polygon) any diagonal is equally good.
   const bool has_normal = normal.squaredNorm() > 0;
-  // Cutting ears takes the square of the number of corners: a huge polygon is fanned.
+  // Ear clipping takes quadratic time, so a huge polygon becomes a fan.
   constexpr std::size_t kMostCorners = 2000;
   if (fan_is_valid || !has_normal || count > kMostCorners) {
     for (std::size_t i = 1; i + 1 < count; ++i)

@@ -109,7 +109,7 @@ void XmlDocument::open_tag() {
   if (bytes_[at_ - 2] != '/') open_.push_back({index, kNone, at_});
 }
 
-/// From behind the name to behind the closing bracket.
+/// Reads from the end of the name to the closing bracket.
 void XmlDocument::read_attributes(Element& element) {
   element.first_attribute = static_cast<std::uint32_t>(attributes_.size());
   for (;;) {

@@ -11,20 +11,20 @@ namespace ist {
 /// Escapes text for an XML or HTML file or attribute. Control characters become '?'.
 std::string xml_text(std::string_view text);
 
-/// The elements of an XML file, in the order they begin. Strict, and without what hostile files are
-/// made of: no document types (so no entities), no encoding but UTF-8, a bounded depth. No
-/// recursion; memory is a small multiple of the file. Entities in attributes stay.
+/// The elements of an XML file in document order. Strict, and without the features of hostile
+/// files: no document types (so no entities), no encoding but UTF-8, a bounded depth. No recursion;
+/// memory is a small multiple of the file. Entities in attributes are not decoded.
 class XmlDocument {
  public:
   static constexpr std::uint32_t kNone = UINT32_MAX;
 
   struct Element {
     std::string_view name;
-    std::string_view text;  ///< of an element without children, comments and all
+    std::string_view text;  ///< of an element without children, comments included
     std::uint32_t first_child = kNone, next_sibling = kNone;
     std::uint32_t first_attribute = 0, attribute_count = 0;
     std::size_t offset = 0;  ///< [bytes] of its tag in the file
-    std::size_t end = 0;     ///< [bytes] behind its last tag
+    std::size_t end = 0;     ///< [bytes] after its closing tag
   };
 
   /// Keeps a reference to the file. Throws Error (file, line) unless it is one closed element.

@@ -34,7 +34,7 @@ void visit(const Solid& solid, const Eigen::Vector3d& centre, double half, int l
         levels.volume[std::size_t(finer)] += cell;
     return;
   }
-  // Exact for planes along the axes, right on average for all others.
+  // Exact for planes along the axes, right on average for others.
   levels.volume[std::size_t(level)] += cell * std::clamp(0.5 - distance / (2 * half), 0.0, 1.0);
   if (level == levels.finest) {
     ++levels.undecided;
@@ -47,10 +47,10 @@ void visit(const Solid& solid, const Eigen::Vector3d& centre, double half, int l
   }
 }
 
-/// The volume of a solid that gives only a signed distance. Octree cells that the distance decides
-/// count whole or not at all, others by the depth of their centres. The error falls about fourfold
-/// a level. The stated error is the larger of twice the last level's change and the change of the
-/// level before, plus an allowance for chance: a generous estimate, not a proof.
+/// The volume of a solid that provides only a signed distance. Octree cells that the distance
+/// decides count fully or not at all, others by the depth of their centres. The error falls about
+/// fourfold a level. The stated error is the larger of twice the last level's change and the change
+/// of the level before, plus an allowance for chance: a generous estimate, not a proof.
 IntegratedVolume integrate_volume(const Solid& solid) {
   const Eigen::AlignedBox3d bounds = solid.bounds();
   const double half = (bounds.max() / 2 - bounds.min() / 2).maxCoeff();
@@ -70,7 +70,7 @@ IntegratedVolume integrate_volume(const Solid& solid) {
 
 constexpr double kPi = std::numbers::pi;
 
-/// A solid whose volume has no closed form: integrated when it is first asked for.
+/// A solid whose volume has no closed form: integrated at the first call.
 class IntegratedSolid : public Solid {
  public:
   double volume() const override { return integrated().value; }
@@ -193,7 +193,7 @@ class FunctionSolid final : public IntegratedSolid {
                 const Eigen::AlignedBox3d& bounds)
       : signed_distance_(std::move(signed_distance)), bounds_(bounds) {
     if (!signed_distance_) throw Error("the signed distance function of a solid is null");
-    unit_frame(bounds);  // throws where there is no box
+    unit_frame(bounds);  // throws if there is no box
   }
   double signed_distance(const Eigen::Vector3d& x) const override { return signed_distance_(x); }
   Eigen::AlignedBox3d bounds() const override { return bounds_; }

@@ -9,11 +9,11 @@
 namespace ist {
 namespace {
 
-/// Planes that touch a surface near a place, and the point that lies on them best: on the edge or
-/// the corner where they meet, in their middle where they are about one.
+/// Planes that touch a surface near a place, and the point that fits them best: on the edge or at
+/// the corner where they meet, or in their middle if they are nearly one plane.
 class PlaneFit {
  public:
-  /// `normal`: of unit length, or zero where the surface has none.
+  /// `normal`: of unit length, or zero if the surface has none.
   void add(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) {
     ++count_;
     points_ += point;
@@ -25,8 +25,8 @@ class PlaneFit {
   }
 
   Eigen::Vector3d best() const {
-    // Tikhonov's regularisation, repeated from where it led: what the planes determine well is
-    // found to many digits, along the rest the middle of the points stays.
+    // Tikhonov's regularisation, repeated from its result: directions that the planes determine
+    // well are found to many digits, the middle of the points determines the rest.
     constexpr double kRegularisation = 0.01;  // squared sine of an angle of 6 degrees
     Eigen::Vector3d x = points_ / count_;
     const double weight = kRegularisation * count_;
@@ -35,7 +35,7 @@ class PlaneFit {
   }
 
  private:
-  /// Minimum of Σ (n·x − n·p)² + weight |x − from|², by Cholesky's factors.
+  /// Minimum of Σ (n·x − n·p)² + weight |x − from|², by a Cholesky factorisation.
   Eigen::Vector3d solved(double weight, const Eigen::Vector3d& from) const {
     double l[3][3] = {};
     for (int i = 0; i < 3; ++i)
@@ -65,7 +65,7 @@ class PlaneFit {
 
 using Eigen::Vector3d;
 
-/// A cell in coordinates of its own: its middle is the origin, its edge the unit.
+/// A cell in its own coordinates: its middle is the origin, its edge the unit.
 class CellField {
  public:
   CellField(const Solid& solid, const CellGrid& grid, const SurfaceCell& cell)
@@ -88,8 +88,8 @@ class CellField {
     return g;
   }
 
-  /// Where the surface crosses an edge of two signs, by false position (the Illinois rule). The
-  /// same for every cell of the edge, but for rounding.
+  /// The point where the surface crosses an edge with two signs, by false position (the Illinois
+  /// rule). The same for every cell at the edge, except for rounding.
   Vector3d crossing(int edge) const {
     const int axis = edge / 4, corner = edge_corners(edge)[0];
     const auto at = [&](double t) {
@@ -126,7 +126,7 @@ class CellField {
   const SurfaceCell& cell_;
 };
 
-/// Off the walls of the cell: vertices of two cells are never one.
+/// Keeps a vertex off the walls of its cell, so that vertices of two cells never coincide.
 Vector3d kept_inside(Vector3d x) {
   constexpr double kReach = 0.5 - 0x1p-10;
   for (int k = 0; k < 3; ++k) x[k] = std::clamp(x[k], -kReach, kReach);
@@ -156,9 +156,9 @@ Vector3d vertex_of(const CellField& field, const SurfaceCell& cell, int loop) {
   return x;
 }
 
-/// The vertices of all cells' loops, [u]: each within its cell, off its walls, where the surface's
-/// tangent planes at the loop's edges meet, or on the surface if these are nearly one plane. Sets
-/// first_vertex.
+/// The vertices of all cells' loops, [u]: each within its cell, off its walls, at the intersection
+/// of the surface's tangent planes at the loop's edges, or on the surface if these are nearly one
+/// plane. Sets first_vertex.
 std::vector<Vector3d> place_vertices(const Solid& solid, const CellGrid& grid,
                                      std::vector<SurfaceCell>& cells) {
   std::uint32_t count = 0;
@@ -188,12 +188,12 @@ using Quad = std::array<std::uint32_t, 4>;  ///< counter-clockwise seen from out
               ". Divide it by its largest slope");
 }
 
-/// The quad across an edge of two signs, by the vertices of the four cells around it.
+/// The quad across an edge with two signs, by the vertices of the four cells around it.
 Quad quad_across(const std::vector<SurfaceCell>& cells, const CellGrid& grid,
                  const SurfaceCell& owner, int axis) {
   const auto b = static_cast<std::size_t>((axis + 1) % 3),
              c = static_cast<std::size_t>((axis + 2) % 3);
-  // Counter-clockwise about the axis; the edge is at the far end of a cell that lies before it.
+  // Counter-clockwise about the axis; the edge is at the far end of a preceding cell.
   constexpr int kBefore[4][2] = {{1, 1}, {0, 1}, {0, 0}, {1, 0}};
   Quad quad{};
   for (std::size_t i = 0; i < 4; ++i) {
@@ -213,7 +213,8 @@ std::vector<Quad> all_quads(const std::vector<SurfaceCell>& cells, const CellGri
   std::vector<Quad> quads;
   for (const SurfaceCell& cell : cells) {
     if (cell.loops == 0) continue;
-    // Edges at the lower corner are this cell's; none of two signs may end the grid.
+    // Edges at the lower corner belong to this cell; no edge with two signs is on the grid's
+    // border.
     for (int axis = 0; axis < 3; ++axis)
       if (cell.crosses(4 * axis)) quads.push_back(quad_across(cells, grid, cell, axis));
     for (std::size_t k = 0; k < 3; ++k)
@@ -224,7 +225,7 @@ std::vector<Quad> all_quads(const std::vector<SurfaceCell>& cells, const CellGri
   return quads;
 }
 
-/// Two triangles a quad, by the diagonal whose middle is nearer to the surface.
+/// Splits each quad into two triangles, by the diagonal whose middle is nearer to the surface.
 std::vector<std::array<std::uint32_t, 3>> split(const Solid& solid, const std::vector<Quad>& quads,
                                                 const std::vector<Eigen::Vector3d>& vertices) {
   std::vector<std::array<std::uint32_t, 3>> triangles(2 * quads.size());

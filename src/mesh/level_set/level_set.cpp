@@ -40,7 +40,7 @@ class Lattice {
 };
 
 /// Steepest slope of the interpolation in a cell, times the spacing. The square of each partial
-/// derivative is convex along every axis, so that a corner has the largest.
+/// derivative is convex along every axis, so a corner has the largest.
 double steepest(const CellValues& v) {
   double most = 0;
   for (std::size_t c = 0; c < 8; ++c) {
@@ -112,7 +112,7 @@ class Interpolation final : public Solid {
   Eigen::AlignedBox3d bounds() const override {
     return {grid_.low, grid_.point(grid_.count[0], grid_.count[1], grid_.count[2])};
   }
-  double volume() const override { return 0; }  // nobody asks: the mesh has one
+  double volume() const override { return 0; }  // unused: the mesh has one
 
  private:
   const Lattice& lattice_;
@@ -158,7 +158,7 @@ void require_usable(const DistanceGrid& grid, const std::string& name) {
   if (!any) throw Error(name + ": no point of the grid is inside the solid");
 }
 
-/// The cells of a grid that the surface crosses, and the solid that they are cells of.
+/// The cells of a grid that the surface crosses, and their solid.
 struct Crossed {
   const Lattice lattice;
   const CellGrid grid;
@@ -179,7 +179,7 @@ struct Crossed {
     for (std::size_t k = 0; k < 3; ++k) grid.count[k] = lattice.cells(k);
     return grid;
   }
-  /// By their keys.
+  /// Returns them sorted by key.
   static std::vector<SurfaceCell> crossed(const Lattice& lattice, const CellGrid& grid) {
     std::vector<std::vector<SurfaceCell>> layers(static_cast<std::size_t>(grid.count[2]));
     tbb::parallel_for(std::size_t{0}, layers.size(), [&](std::size_t k) {

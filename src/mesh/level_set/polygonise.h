@@ -7,7 +7,7 @@
 
 namespace ist {
 
-/// Summed in this order.
+/// Summed in a fixed order.
 inline double dot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -30,16 +30,16 @@ struct CellGrid {
 /// A cell that the surface may meet. Corner i is at (i & 1, i >> 1 & 1, i >> 2). Edge 4a + b runs
 /// along axis a, from the corner whose coordinates along the axes a + 1 and a + 2 are b's bits.
 ///
-/// The surface in a cell is one vertex for each loop of its edges of two signs: two such edges
-/// follow each other where they lie on one face; of four on a face, those that share an inner
-/// corner. Neighbours thus agree, and the surface is closed.
+/// The surface in a cell is one vertex for each loop of its edges with two signs. Two such edges
+/// follow each other if they lie on one face; of four on a face, those that share an inner corner.
+/// Neighbours thus agree, and the surface is closed.
 struct SurfaceCell {
   std::uint64_t key = 0;  ///< Morton code of `at`; cells are listed by it
   std::array<std::int32_t, 3> at = {};
   std::uint8_t inside = 0;  ///< bit i: the signed distance of corner i is > 0
   std::uint8_t loops = 0;
   std::uint32_t first_vertex = 0;             ///< of the loops' vertices, one after the other
-  std::array<std::uint8_t, 12> loop_of = {};  ///< of every edge of two signs
+  std::array<std::uint8_t, 12> loop_of = {};  ///< of every edge with two signs
 
   bool crosses(int edge) const;
 };
@@ -47,13 +47,13 @@ struct SurfaceCell {
 /// Corners at the ends of an edge of a cell, the one of the smaller coordinate first.
 std::array<int, 2> edge_corners(int edge);
 
-/// The grid of `cells` cells along the longest side of the solid's bounds. Its planes lie off
-/// those of the box. Throws Error for bounds that are no box.
+/// The grid of `cells` cells along the longest side of the solid's bounds. Its planes do not
+/// coincide with those of the box. Throws Error for invalid bounds.
 CellGrid grid_around(const Solid& solid, unsigned cells);
 
-/// Every cell that the surface meets, and others near it, by Morton code. Cells are left out where
-/// a middle is further from the surface than the corners are from it, so that the cost follows the
-/// surface. `report(level, levels)`: before each level.
+/// Every cell that the surface meets, and others near it, by Morton code. Cells are skipped if
+/// their middle is further from the surface than from their corners, so the cost is proportional to
+/// the surface. `report(level, levels)`: before each level.
 std::vector<SurfaceCell> find_surface_cells(const Solid& solid, const CellGrid& grid,
                                             const std::function<void(int, int)>& report);
 
@@ -67,34 +67,34 @@ void find_loops(SurfaceCell& cell);
 const SurfaceCell* cell_at(const std::vector<SurfaceCell>& cells,
                            const std::array<std::int32_t, 3>& at);
 
-/// A mesh in place of a solid.
 struct Polygonised {
   /// [u] a closed, oriented surface: every edge is used equally often in both directions
   TriangleMesh mesh;
-  /// [u] proven: every point of the mesh is this near to the solid's surface, and the reverse.
+  /// [u] proven: every point of the mesh is this near to the solid's surface, and vice versa.
   double error = 0;
 };
 
 constexpr unsigned kFewestCells = 8, kMostCells = 1024;
 
-/// The surface of a solid as triangles, by dual contouring: a vertex in every cell that the surface
-/// crosses, where its tangent planes meet, so that edges and corners stay sharp.
+/// The surface of a solid as triangles, by dual contouring: one vertex in every cell that the
+/// surface crosses, at the intersection of its tangent planes, so that edges and corners stay
+/// sharp.
 ///
-/// `cells`: along the longest side of the bounds, [8, 1024]. Time grows with the surface, by the
-/// square of it. Same bytes for any number of threads, which are those of the current arena.
+/// `cells`: along the longest side of the bounds, [8, 1024]. Time grows with the square of this.
+/// Same bytes for any number of threads, which are those of the current arena.
 ///
-/// The surface is where signed_distance() is 0. The error is proven from its being 1-Lipschitz and
-/// of the right sign alone: where it underestimates distances, as CSG's does, the proof takes
-/// longer and the error may come out larger, never too small. Walls of zero inside the solid (two
-/// boxes united that share a face) are surface by that measure; the mesh has none there, and the
-/// error says how far they are from it.
+/// The surface is the zero set of signed_distance(). The error is proven from the 1-Lipschitz
+/// property and the sign alone: if distances are underestimated, as by CSG, the proof takes longer
+/// and the error may be larger, never too small. Interior walls where the distance is 0 (the union
+/// of two boxes that share a face) count as surface; the mesh has none there, and the error
+/// includes the distance to them.
 ///
-/// Mesh and solid agree about every point further from both surfaces than the error, as far as the
-/// mesh does not meet itself.
+/// Mesh and solid agree at every point further from both surfaces than the error, unless the mesh
+/// intersects itself.
 ///
-/// Throws Error where no cell sees both sides of the surface, where the solid reaches out of its
-/// bounds, where the signed distance is not 1-Lipschitz or not a number, as far as that is met, and
-/// if progress cancels (stage "polygonise").
+/// Throws Error if no cell sees both sides of the surface, if the solid extends beyond its bounds,
+/// if the signed distance is found not to be 1-Lipschitz or not a number, and if progress cancels
+/// (stage "polygonise").
 Polygonised polygonise(const Solid& solid, unsigned cells, const ProgressCallback& progress = {});
 
 /// The mesh of mesh_level_set(), without the proof of its distance from the level set, which would
@@ -102,7 +102,7 @@ Polygonised polygonise(const Solid& solid, unsigned cells, const ProgressCallbac
 ClosedMesh level_set_surface(const DistanceGrid& distances, const std::string& name);
 
 /// The mesh of a solid from the cells that its surface crosses, all of them listed by Morton code
-/// with their loops, and its error. Reports the second 60 % of the work. Throws Error as
+/// with their loops, and its error. Reports the second 60 % of the work. Throws Error like
 /// polygonise().
 Polygonised dual_mesh(const Solid& solid, const CellGrid& grid, std::vector<SurfaceCell> cells,
                       Stage& stage);
@@ -111,11 +111,11 @@ Polygonised dual_mesh(const Solid& solid, const CellGrid& grid, std::vector<Surf
 TriangleMesh dual_surface(const Solid& solid, const CellGrid& grid, std::vector<SurfaceCell>& cells,
                           Stage& stage);
 
-/// [u] how far a triangle of the mesh is from the solid's surface anywhere: the largest over all.
+/// [u] The largest distance of any point of the mesh from the solid's surface.
 double mesh_to_surface(const Solid& solid, const CellGrid& grid, const TriangleMesh& mesh);
 
-/// [u] how far the surface is from the mesh that place_vertices() began, anywhere: the largest over
-/// all listed cells. In others there is none.
+/// [u] The largest distance of the surface in any listed cell from the mesh that place_vertices()
+/// began. Other cells contain no surface.
 double surface_to_mesh(const Solid& solid, const CellGrid& grid,
                        const std::vector<SurfaceCell>& cells, const TriangleMesh& mesh);
 

@@ -13,15 +13,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Part of a cell's edge: what is proven to be nearer needs no closer look. A closer look takes
-/// four times as long, which many cells do not need: they are small.
+/// Fraction of a cell's edge: bounds below it need no refinement. A refinement takes four times as
+/// long, and many cells, being small, do not need it.
 double near_enough(std::size_t cells_or_triangles) {
   constexpr std::size_t kMany = 100'000;
   return cells_or_triangles > kMany ? 0.25 : 0.125;
 }
-constexpr double kMargin = 1 + 1e-12;  // above relative roundings
-// How far triangles and cells are divided, and how many parts a level may have: more are only
-// needed where the signed distance underestimates much, and would take too long.
+constexpr double kMargin = 1 + 1e-12;  // covers relative rounding
+// Limits of the subdivision of triangles and cells, and of the parts of a level. More are needed
+// only if the signed distance underestimates much, and would take too long.
 constexpr int kTriangleDepth = 5, kCellDepth = 5;
 constexpr std::size_t kMostPieces = 256, kMostParts = 4096;
 
@@ -33,8 +33,8 @@ double largest(const std::vector<double>& values) {
   return most;
 }
 
-/// Bounds the distance of a triangle's points from the surface. Whatever is within |s| of a point
-/// of signed distance s is on its side. So the normals through the triangle lead from a ball
+/// Bounds the distance of a triangle's points from the surface. Everything within |s| of a point
+/// with signed distance s is on its side. So the normals through the triangle lead from a ball
 /// outside to one inside, and cross the surface in between.
 class TriangleError {
  public:
@@ -82,7 +82,7 @@ class TriangleError {
     return best;
   }
 
-  /// A distance at which the sign changes, along the normal or across it.
+  /// A distance within which the sign changes, along the normal or across it.
   double to_change(const Vector3d& middle) const {
     const double here = solid_.signed_distance(middle);
     const auto changes = [&](const Vector3d& offset) {
@@ -159,7 +159,8 @@ class CellError {
   const std::vector<TriangleFrame<double>> triangles_;
 };
 
-/// Triangles at the vertices of a cell and, where those are none or `around`, of its neighbours.
+/// The triangles at the vertices of a cell and, if there are none or if `around`, of its
+/// neighbours.
 std::vector<TriangleFrame<double>> triangles_near(const std::vector<SurfaceCell>& cells,
                                                   const SurfaceCell& cell, bool around,
                                                   const ItemGroups<>& fans,

@@ -10,7 +10,7 @@
 namespace ist {
 namespace {
 
-// Where the box begins in the grid: off the planes that models like.
+// The offset of the box in the grid, which avoids planes that are frequent in models.
 constexpr double kBoxStart[3] = {1.3819, 1.4142, 1.3028};
 
 }  // namespace
@@ -81,7 +81,7 @@ bool SurfaceCell::crosses(int edge) const {
 
 CellGrid grid_around(const Solid& solid, unsigned cells) {
   const Eigen::AlignedBox3d box = solid.bounds();
-  unit_frame(box);  // throws where there is no box
+  unit_frame(box);  // throws if there is no box
   CellGrid grid;
   grid.edge = 2 * ((box.max() / 2 - box.min() / 2).maxCoeff() / cells);
   for (int k = 0; k < 3; ++k) {
@@ -114,7 +114,7 @@ std::vector<SurfaceCell> find_surface_cells(const Solid& solid, const CellGrid& 
         }
         if (!within) continue;
         const double distance = solid.signed_distance(grid.point(middle[0], middle[1], middle[2]));
-        // NaN is kept, and seen where signs are taken.
+        // NaN is kept, and detected when signs are computed.
         if (!(std::abs(distance) > reach)) kept[c] = static_cast<std::uint8_t>(kept[c] | 1 << i);
       }
     });

@@ -10,11 +10,11 @@
 namespace ist {
 namespace {
 
-/// Where two triangles meet: in one plane, or from one point to another.
+/// The common points of two triangles: in one plane, or a segment.
 struct Meeting {
   std::array<std::uint32_t, 2> triangles;
   bool coplanar = false;
-  std::uint32_t from = kNoIndex, to = kNoIndex;  ///< points; equal where it is one point
+  std::uint32_t from = kNoIndex, to = kNoIndex;  ///< points; equal if it is one point
 };
 
 /// A point of two triangles: a vertex (low = high), or where an edge crosses a triangle's plane.
@@ -29,7 +29,7 @@ class PairOfTriangles {
                   std::vector<Named>& found)
       : points_(points), triangles_(triangles), found_(found) {}
 
-  /// Adds the ends of what two triangles have in common; false where they lie in one plane.
+  /// Adds the ends of the common segment of two triangles; false if they lie in one plane.
   bool add_ends(std::uint32_t a, std::uint32_t b) {
     const Sides of_a = sides(b, a), of_b = sides(a, b);
     if (of_a == Sides{0, 0, 0}) return false;
@@ -41,7 +41,7 @@ class PairOfTriangles {
  private:
   using Sides = std::array<int, 3>;
 
-  /// On which sides of triangle `plane` the corners of t are.
+  /// The sides of triangle `plane` on which the corners of t are.
   Sides sides(std::uint32_t plane, std::uint32_t t) const {
     const Triangle& of = triangles_[plane];
     Sides result;
@@ -63,7 +63,7 @@ class PairOfTriangles {
     }
   }
 
-  /// Whether a closed triangle contains a vertex in its plane.
+  /// True if a closed triangle contains a vertex in its plane.
   bool holds(const Triangle& t, std::uint32_t p) const {
     if (p == t[0] || p == t[1] || p == t[2]) return true;
     int k = 0;
@@ -72,7 +72,7 @@ class PairOfTriangles {
                      points_.turn(k, t[2], t[0], p));
   }
 
-  /// Whether the line pq, which crosses the plane of t, meets the closed triangle.
+  /// True if the line pq, which crosses the plane of t, meets the closed triangle.
   bool is_pierced(const Triangle& t, std::uint32_t p, std::uint32_t q) const {
     const auto around = [&](std::uint32_t a, std::uint32_t b) {
       return a == p || a == q || b == p || b == q ? 0 : points_.side({p, q, a}, points_.view(b));
@@ -89,7 +89,7 @@ class PairOfTriangles {
   std::vector<Named>& found_;
 };
 
-/// Gives every name in `names` (sorted, none twice) its number.
+/// Numbers every name in `names` (sorted, unique).
 std::vector<std::uint32_t> number(ExactPoints& points, const std::vector<Triangle>& triangles,
                                   const std::vector<Named>& names, WatchedWork& work,
                                   double share) {
@@ -110,9 +110,9 @@ std::vector<std::uint32_t> number(ExactPoints& points, const std::vector<Triangl
   return numbers;
 }
 
-/// The meetings of pairs of triangles that meet, in their order; new points are added in an order
-/// that does not depend on threads. Throws Unresolvable where the pairs contradict themselves, and
-/// as `work` does, of which this is `share`.
+/// The meetings of pairs of triangles that meet, in their order. New points are added in an order
+/// that does not depend on threads. Throws Unresolvable if the pairs are contradictory, and as
+/// `work` does. `share`: the part of `work`.
 std::vector<Meeting> find_meetings(ExactPoints& points, const std::vector<Triangle>& triangles,
                                    const std::span<const std::array<std::uint32_t, 2>> pairs,
                                    WatchedWork& work, double share) {
@@ -148,11 +148,11 @@ std::vector<Meeting> find_meetings(ExactPoints& points, const std::vector<Triang
 /// Each takes some 600 bytes and 10 µs.
 constexpr std::size_t kMostCrossings = 500'000;
 
-/// Shares of the whole work, about.
+/// Approximate shares of the whole work.
 constexpr double kMeetings = 0.2, kCuts = 0.2, kPieces = 0.4;
 
-/// A segment in the plane of a cluster: a side of a triangle of it, or what another triangle, in
-/// the plane `other`, has in common with one.
+/// A segment in the plane of a cluster: a side of one of its triangles, or the intersection of one
+/// with another triangle, in the plane `other`.
 struct Segment {
   std::uint32_t from, to;
   std::uint32_t other = kNoIndex;
@@ -162,21 +162,21 @@ struct Segment {
   bool is_side() const { return other == kNoIndex; }
 };
 
-/// Where two segments cross that do so between their ends.
+/// The point where two segments cross between their ends.
 struct CutCrossing {
   std::array<std::size_t, 2> segments;
   ExactPoint exact;
   RoundedPoint rounded;
 };
 
-/// Triangles in one plane that meet, and what cuts them.
+/// Triangles in one plane that meet, and their cuts.
 struct Cluster {
   std::vector<std::uint32_t> triangles;
   std::vector<Segment> segments = {};
-  std::vector<std::uint32_t> touched = {};  ///< points where other triangles only touch
+  std::vector<std::uint32_t> touched = {};  ///< points touched by other triangles
   std::vector<CutCrossing> crossings = {};
   std::vector<PlanarTriangulation::Covered> pieces = {};
-  int axis = 0;  ///< seen along it, the plane is no line
+  int axis = 0;  ///< the plane does not project to a line along it
 };
 
 class ClusterWork {
@@ -197,8 +197,8 @@ class ClusterWork {
     }
   }
 
-  /// Puts points on the segments that contain them and finds where segments cross.
-  /// `crossings`: how many all clusters have so far.
+  /// Assigns points to the segments that contain them and finds the crossings of segments.
+  /// `crossings`: the number in all clusters so far.
   void meet(std::atomic<std::size_t>& crossings) {
     std::vector<Segment>& segments = cluster_.segments;
     std::vector<std::size_t> order(segments.size());
@@ -287,7 +287,7 @@ class ClusterWork {
     return {low, high};
   }
 
-  /// p lies on the line through s: does it lie on s?
+  /// True if p, on the line through s, lies on s.
   bool within(std::uint32_t p, const Segment& s) const {
     for (const int k : {first(), second()})
       if (points_.compare(k, s.from, p) * points_.compare(k, p, s.to) < 0) return false;
@@ -301,7 +301,7 @@ class ClusterWork {
     if (turn(s.from, s.to, p) == 0 && within(p, s)) s.on.push_back(p);
   }
 
-  /// Whether they cross between their ends.
+  /// True if they cross between their ends.
   bool meet(std::size_t i, std::size_t j) {
     Segment &a = cluster_.segments[i], &b = cluster_.segments[j];
     for (const auto& [shared, end] : {std::pair(a.from, a.to), std::pair(a.to, a.from)})
@@ -351,7 +351,7 @@ class ClusterWork {
 
 using Frames = std::array<std::array<std::uint32_t, 3>, 3>;
 
-/// For each axis three points that, seen along it, are around all others.
+/// For each axis, three points that surround all others in projection.
 Frames add_frames(ExactPoints& points) {
   double largest = 0;
   for (std::uint32_t p = 0; p < points.size(); ++p)

@@ -12,28 +12,28 @@
 
 namespace ist {
 
-/// A triangulation of points of a plane, seen against a coordinate axis, that contains given
-/// segments. Exact, whatever lies on one line.
+/// A triangulation of points in a plane, projected along a coordinate axis, that contains given
+/// segments. Exact, even for collinear points.
 class PlanarTriangulation {
  public:
-  /// `frame`: three points around all others. `inner`: the points, none twice.
+  /// `frame`: three points around all others. `inner`: the points, unique.
   PlanarTriangulation(const ExactPoints& points, int axis,
                       const std::array<std::uint32_t, 3>& frame,
                       const std::vector<std::uint32_t>& inner);
 
-  /// Makes a segment between two of the points part of it. Nothing else may lie on the segment or
-  /// cross it. The winding number of one of two kinds of curves, whichever `of` says, steps up by
-  /// `step` from its right to its left.
+  /// Inserts a segment between two of the points. Nothing else may lie on it or cross it. `of`
+  /// selects one of two kinds of curves, whose winding number rises by `step` from its right to its
+  /// left.
   void insert(std::uint32_t from, std::uint32_t to, int step, std::size_t of);
 
-  /// Turns edges that are no segments where that makes triangles rounder.
+  /// Flips edges that are no segments if that makes triangles rounder.
   void make_round();
 
   struct Covered {
     Triangle triangle;           ///< counter-clockwise
     std::array<int, 2> winding;  ///< not both 0
   };
-  /// Triangles about which either kind of segments winds.
+  /// Triangles with a nonzero winding number of either kind.
   std::vector<Covered> covered() const;
 
  private:
@@ -76,14 +76,15 @@ class PlanarTriangulation {
   std::uint64_t random_ = 1;
 };
 
-/// Work that another thread watches and may end.
+/// Cancellable work with progress that another thread watches.
 class WatchedWork : public WorkStop {
  public:
   /// Calls each(i) for all i < count on the caller's TBB threads: `share` of all work. Throws
   /// Stopped soon after stop() was called.
   template <class Each>
   void for_each(std::size_t count, double share, const Each& each) {
-    constexpr std::size_t kTold = 64;  // at a time: threads that write the same place wait
+    constexpr std::size_t kTold =
+        64;  // items per update, as threads that write the same number wait for each other
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count), [&](const auto& range) {
       for (std::size_t i = range.begin(), from = i; i < range.end(); ++i) {
         look();
@@ -102,18 +103,18 @@ class WatchedWork : public WorkStop {
   std::atomic<double> done_ = 0;
 };
 
-/// A mesh's triangles, cut where they meet: pieces share nothing but whole sides and corners.
+/// A mesh's triangles, cut where they meet: pieces share only whole sides and corners.
 struct Arrangement {
   ExactPoints points;
   std::vector<Triangle> pieces;       ///< corners by the points' numbers
-  std::vector<std::uint32_t> source;  ///< [piece] a triangle of the mesh in whose plane it lies
-  std::vector<int> winding_step;      ///< [piece] > 0: of the winding number, to behind it
-  std::vector<std::uint32_t> plane;   ///< [triangle] those in one plane that meet have the same
-  std::vector<std::uint32_t> walls;   ///< by `plane`: where pieces cancelled each other
+  std::vector<std::uint32_t> source;  ///< [piece] a triangle of the mesh in the same plane
+  std::vector<int> winding_step;      ///< [piece] > 0: rise of the winding number to its back
+  std::vector<std::uint32_t> plane;   ///< [triangle] triangles in one plane that meet have the same
+  std::vector<std::uint32_t> walls;   ///< by `plane`: walls where pieces cancelled each other
 };
 
-/// Leaves out triangles on a line, and pieces that others cancel by facing the other side. `pairs`:
-/// the intersecting ones. Deterministic. Throws Unresolvable, and what `work` throws.
+/// Leaves out degenerate triangles, and pieces cancelled by others of opposite orientation.
+/// `pairs`: the intersecting ones. Deterministic. Throws Unresolvable, and what `work` throws.
 Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
                     const std::vector<Triangle>& triangles,
                     std::span<const std::array<std::uint32_t, 2>> pairs, WatchedWork& work);

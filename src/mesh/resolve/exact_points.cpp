@@ -12,9 +12,9 @@ namespace ist {
 namespace {
 
 constexpr double kHalfUlp = 0x1p-53;  ///< of a rounded coordinate, relative to it
-constexpr double kTiny = 1e-290;      ///< more than underflow costs
+constexpr double kTiny = 1e-290;      ///< exceeds the effect of underflow
 
-/// numerator / denominator · 2^exponent as the nearest double, and the rest to 2^-50 of it.
+/// numerator / denominator · 2^exponent as the nearest double, and the remainder to 2^-50 of it.
 std::array<double, 2> quotient(const Whole& numerator, const Whole& denominator, int exponent) {
   if (numerator.is_zero()) return {0, 0};
   Whole above = abs(numerator), below = denominator, whole, remainder;
@@ -63,7 +63,7 @@ bool equal(const ExactPoint& a, const ExactPoint& b) {
   return true;
 }
 
-/// Bound on the error of p_k as it stands in double.
+/// Bound on the error of p_k in double.
 double error_of(const PointView& p, int k) {
   return p.exact == nullptr ? 0 : std::abs(p.at(k)) * kHalfUlp;
 }
@@ -191,7 +191,7 @@ int ExactPoints::turn(int k, const PointView& a, const PointView& b, const Point
                                 corner_y * (std::abs(ax) + std::abs(bx) + corner_x)) +
                        kTiny;
   if (std::abs(area) > bound) return area > 0 ? 1 : -1;
-  // Twice as many digits.
+  // The same with twice as many digits.
   const double again = determinant(difference(a, c, x), difference(b, c, y), difference(a, c, y),
                                    difference(b, c, x));
   const double size_x = std::abs(a.at(x)) + std::abs(b.at(x)) + std::abs(c.at(x));

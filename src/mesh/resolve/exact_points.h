@@ -9,7 +9,7 @@
 
 namespace ist {
 
-/// Why a mesh is not resolved. Thrown and caught within the unit.
+/// Thrown and caught within this folder, with the reason why a mesh is not resolved.
 struct Unresolvable {
   std::string reason;
 };
@@ -43,16 +43,16 @@ struct ExactPlane {
 };
 
 ExactPoint common_point(const ExactPlane& a, const ExactPlane& b, const ExactPlane& c);
-/// Where the line from p to q meets a plane that is `height_p` below p and `height_q` below q.
+/// The intersection of the line from p to q with a plane that is `height_p` below p and `height_q`
+/// below q.
 ExactPoint between(const WholeVector& p, const WholeVector& q, const Whole& height_p,
                    const Whole& height_q);
 
-/// An exact point in double: the nearest, and what is left, nearly.
+/// An exact point in double: the nearest double, and the approximate remainder.
 struct RoundedPoint {
   Eigen::Vector3d at = Eigen::Vector3d::Zero(), rest = Eigen::Vector3d::Zero();
 };
 
-/// A point to be asked about.
 struct PointView {
   const RoundedPoint* rounded;
   const ExactPoint* exact;  ///< null: `rounded->at` is exact
@@ -60,11 +60,11 @@ struct PointView {
   double at(int k) const { return rounded->at[k]; }
 };
 
-/// Points of one arrangement by number: a mesh's vertices, then points made from them. Every
-/// coordinate of a vertex is a whole multiple of one power of two, the lattice's step, so that all
-/// arithmetic is in whole numbers. Equal points have one number.
+/// Points of one arrangement by number: a mesh's vertices, then points constructed from them. Every
+/// coordinate of a vertex is a multiple of one power of two, the lattice's step, so all arithmetic
+/// is on integers. Equal points have one number.
 ///
-/// Signs are exact: decided in double where the rounding allows, else in whole numbers.
+/// Signs are exact: decided in double if the rounding allows, else in integers.
 class ExactPoints {
  public:
   explicit ExactPoints(const std::vector<Eigen::Vector3d>& vertices);
@@ -79,7 +79,7 @@ class ExactPoints {
   /// `at`: each coordinate's nearest double, the same for equal points; `rest`: within 2^-50 of
   /// itself.
   RoundedPoint round(const ExactPoint& point) const;
-  /// The number of a point whose round() is `rounded`; that of a double on the lattice.
+  /// Adds a point whose round() is `rounded` and returns its number.
   std::uint32_t add(ExactPoint point, const RoundedPoint& rounded);
   std::uint32_t add(const Eigen::Vector3d& point) {
     const RoundedPoint rounded = {point};
@@ -91,14 +91,13 @@ class ExactPoints {
   ExactPoint exact(const PointView& p) const;
   ExactPlane plane(const Triangle& given) const;
 
-  /// Sign of the area of abc seen against axis k: 1 where it is counter-clockwise.
+  /// Sign of the area of abc seen against axis k: 1 if it is counter-clockwise.
   int turn(int k, const PointView& a, const PointView& b, const PointView& c) const;
   int turn(int k, std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
     return a == b || b == c || c == a ? 0 : turn(k, view(a), view(b), view(c));
   }
-  /// Sign of a_k − b_k.
   int compare(int k, std::uint32_t a, std::uint32_t b) const;
-  /// 1 where p is in front of a triangle of vertices, 0 in its plane.
+  /// 1 if p is in front of a triangle of vertices, 0 in its plane.
   int side(const Triangle& given, const PointView& p) const;
 
  private:

@@ -32,7 +32,7 @@ void PlanarTriangulation::hand_over(std::uint32_t cell, std::uint32_t from, std:
   std::replace(cells_[cell].beyond.begin(), cells_[cell].beyond.end(), from, to);
 }
 
-/// The cell that contains p, by a walk that turns at random and so comes to an end.
+/// The cell that contains p, by a randomised walk, which terminates.
 std::uint32_t PlanarTriangulation::cell_of(std::uint32_t p) {
   for (auto at = static_cast<std::uint32_t>(cells_.size() - 1);;) {
     random_ = random_ * 6364136223846793005 + 1442695040888963407;
@@ -58,14 +58,14 @@ void PlanarTriangulation::insert_point(std::uint32_t p) {
   set(third, {{c, a, p}, {at, second, beyond_b}});
   hand_over(beyond_a, at, second);
   hand_over(beyond_b, at, third);
-  // On a side: the cell between the side and p is flat.
+  // p is on a side: the cell between the side and p is flat.
   for (const std::uint32_t flat : {at, second, third}) {
     const Cell cell = cells_[flat];
     if (turn(cell.corner[0], cell.corner[1], p) == 0) return flip({flat, 2});
   }
 }
 
-/// The edge across from a corner, turned: a quadrilateral's other diagonal.
+/// Replaces the edge opposite to a corner by the quadrilateral's other diagonal.
 void PlanarTriangulation::flip(const Place edge) {
   const std::uint32_t t = edge.cell, u = cells_[t].beyond[edge.corner], i = edge.corner;
   if (u == kNoIndex) throw Unresolvable{"a point lies on the border of a triangulation"};
@@ -81,7 +81,7 @@ void PlanarTriangulation::flip(const Place edge) {
   hand_over(past_bp, t, u);
 }
 
-/// Whether the two cells at an edge form a strictly convex quadrilateral.
+/// True if the two cells at an edge form a strictly convex quadrilateral.
 bool PlanarTriangulation::can_flip(const Place edge) const {
   const Cell& cell = cells_[edge.cell];
   const std::uint32_t u = cell.beyond[edge.corner];
@@ -107,8 +107,8 @@ PlanarTriangulation::Place PlanarTriangulation::next_about(const Place place) co
   return {next, corners[0] == corner ? 0u : corners[1] == corner ? 1u : 2u};
 }
 
-/// The edge ab; no cell where there is none. `a` is no point of the frame. About b, too, unless it
-/// is one: the end with fewer edges decides.
+/// The edge ab; no cell if there is none. `a` must not be a point of the frame. Searches about the
+/// end with fewer edges, unless b is in the frame.
 PlanarTriangulation::Place PlanarTriangulation::edge_between(std::uint32_t a,
                                                              std::uint32_t b) const {
   const Place about_a = place_of(a), about_b = place_of(b);
@@ -129,7 +129,7 @@ void PlanarTriangulation::insert(std::uint32_t from, std::uint32_t to, int step,
   const auto [known, fresh] = steps_.try_emplace(key(std::min(from, to), std::max(from, to)));
   known->second[of] += up ? step : -step;
   if (!fresh || edge_between(from, to).cell != kNoIndex) return;
-  // The edges it crosses, from one end to the other.
+  // The edges that the segment crosses, from one end to the other.
   Place at = place_of(from);
   while (!(turn(from, cells_[at.cell].corner[after(at.corner)], to) > 0 &&
            turn(from, cells_[at.cell].corner[before(at.corner)], to) < 0))
@@ -141,12 +141,12 @@ void PlanarTriangulation::insert(std::uint32_t from, std::uint32_t to, int step,
     crossed.push_back({right, left});
     const std::uint32_t u = cells_[at.cell].beyond[at.corner];
     const auto& corners = cells_[u].corner;
-    // The side of u that is left next: across from its corner that the segment passes.
+    // The next side of u: opposite to its corner that the segment passes.
     const std::uint32_t ahead = corners[0] != right && corners[0] != left   ? 0u
                                 : corners[1] != right && corners[1] != left ? 1u
                                                                             : 2u;
     if (corners[ahead] == to) break;
-    // With the tip on the left, the segment leaves across from the old left corner.
+    // With the tip on the left, the segment leaves opposite to the old left corner.
     const std::uint32_t passed = turn(from, to, corners[ahead]) > 0 ? left : right;
     at = {u, corners[0] == passed ? 0u : corners[1] == passed ? 1u : 2u};
   }
@@ -162,7 +162,7 @@ void PlanarTriangulation::insert(std::uint32_t from, std::uint32_t to, int step,
     }
     const std::uint32_t p = cells_[edge.cell].corner[edge.corner];
     flip(edge);
-    const std::uint32_t q = cells_[edge.cell].corner[2];  // as flip() leaves it
+    const std::uint32_t q = cells_[edge.cell].corner[2];  // after flip()
     if (p == from || p == to || q == from || q == to) continue;
     if (turn(from, to, p) != turn(from, to, q)) crossed.push_back({p, q});
   }
@@ -174,8 +174,8 @@ bool PlanarTriangulation::is_segment(const Place edge) const {
   return steps_.contains(key(std::min(a, b), std::max(a, b)));
 }
 
-/// Whether the point across an edge lies well within the circle through the cell's corners. In
-/// double: no answer is wrong, some are worse.
+/// True if the point opposite to an edge lies well within the circle through the cell's corners. In
+/// double: errors only make the triangulation worse, never wrong.
 bool PlanarTriangulation::is_sharp(const Place edge) const {
   const Cell &cell = cells_[edge.cell], &other = cells_[cell.beyond[edge.corner]];
   const std::uint32_t j = other.beyond[0] == edge.cell ? 0 : other.beyond[1] == edge.cell ? 1 : 2;

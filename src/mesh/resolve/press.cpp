@@ -18,7 +18,7 @@ namespace {
 using Point = Eigen::Vector3d;
 using Polygon = std::vector<Point>;  ///< convex
 
-/// In near distances: least size of a face that touches another, and of the part that does.
+/// In near distances: the least size of a face that touches another, and of the touching part.
 constexpr double kNarrowest = 16;
 
 class Faces {
@@ -33,10 +33,10 @@ class Faces {
     });
   }
 
-  /// Zero of needles.
+  /// Zero for needles.
   const Point& normal(std::size_t t) const { return normals_[t]; }
 
-  /// Whether two triangles lie on each other from opposite sides.
+  /// True if two triangles touch face to face.
   bool touch(std::size_t a, std::size_t b) const {
     if (!(normals_[a].dot(normals_[b]) < -0.9)) return false;
     const auto of = corners(a), over = corners(b);
@@ -55,7 +55,7 @@ class Faces {
     return area.norm() > kNarrowest * near_ * around;
   }
 
-  /// Whether they lie in one plane exactly.
+  /// True if they lie in one plane exactly.
   bool coplanar(std::size_t a, std::size_t b) const {
     const auto of = corners(a), over = corners(b);
     return std::all_of(over.begin(), over.end(), [&](const Point& p) {
@@ -86,8 +86,8 @@ class Faces {
   std::vector<Point> normals_;
 };
 
-/// Nearly the shortest displacement that moves one step along each normal; at a knife-sharp edge it
-/// is cut short. Zero if faces on both sides share the vertex.
+/// Nearly the shortest displacement that moves one step along each normal; limited at knife-sharp
+/// edges. Zero if faces on both sides share the vertex.
 Point displacement_along(const std::vector<Point>& normals) {
   constexpr double kFarthest = 8;
   constexpr int kRounds = 64;
@@ -109,7 +109,7 @@ Point displacement_along(const std::vector<Point>& normals) {
 
 using Pairs = std::vector<std::array<std::uint32_t, 2>>;
 
-/// [vertex] those of touching faces, where some of the connected faces touch inexactly.
+/// [vertex] True at touching faces, if some of the connected faces touch inexactly.
 std::vector<bool> touching_vertices(const TriangleMesh& mesh, const Faces& faces,
                                     const Pairs& touching) {
   DisjointSets together(mesh.vertices.size());

@@ -21,7 +21,7 @@
 namespace ist {
 namespace {
 
-constexpr double kPatches = 0.1;  // share of the whole work, about
+constexpr double kPatches = 0.1;  // approximate share of the whole work
 
 class Rays {
  public:
@@ -68,7 +68,7 @@ class Rays {
     return sum;
   }
 
-  /// Nothing where the line meets an edge.
+  /// Nothing if the line meets an edge.
   std::optional<int> count(const PointView& from, std::uint32_t piece, int axis, int facing) {
     const std::uint32_t own = arrangement_.plane[arrangement_.source[piece]];
     int winding = 0;
@@ -109,15 +109,15 @@ class Rays {
   std::array<std::optional<TriangleColumns>, 3> columns_;
 };
 
-/// Pieces that hang together where nothing else meets them, so that the winding numbers on their
-/// two sides are the same all over.
+/// Connected pieces that nothing else meets in between: the winding numbers on their two sides are
+/// constant.
 struct Patches {
   std::vector<std::uint32_t> of_piece;
   std::vector<int> in_front;  ///< [patch] the winding number there
 };
 
-/// Exact. On the caller's TBB threads; the answer does not depend on their number.
-/// Throws Unresolvable, and as `work` does.
+/// Exact. Runs on the caller's TBB threads; the answer does not depend on their number. Throws
+/// Unresolvable, and as `work` does.
 Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& arrangement,
                      WatchedWork& work) {
   const std::vector<Triangle>& pieces = arrangement.pieces;
@@ -174,13 +174,13 @@ const Pairs& pairs_of(ClosedMesh& closed) {
   return *closed.meeting_pairs;
 }
 
-/// Six times what a triangle adds to the volume, seen from a point.
+/// Six times the volume of the tetrahedron of a triangle and a point.
 double volume_of(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                  const Eigen::Vector3d& from) {
   return (a - from).dot((b - from).cross(c - from));
 }
 
-/// Volume and the sum of its terms' sizes.
+/// Volume, and the sum of its terms' magnitudes.
 struct Volume {
   double sum = 0, size = 0, area = 0;
 
@@ -195,7 +195,7 @@ struct Volume {
   }
 };
 
-/// The triangles of a mesh that hang together by edges or meet have the same number.
+/// Numbers the triangles of a mesh; those connected by edges or meetings have the same number.
 std::vector<std::uint32_t> groups_of(const std::vector<Triangle>& triangles, const Pairs& pairs) {
   DisjointSets sets = connected_pieces(EdgeTable(triangles));
   for (const auto& [a, b] : pairs) sets.unite(a, b);
@@ -204,13 +204,13 @@ std::vector<std::uint32_t> groups_of(const std::vector<Triangle>& triangles, con
   return groups;
 }
 
-/// To the nearest multiples of a power of two.
+/// Rounds to multiples of a power of two.
 Eigen::Vector3d snapped(const Eigen::Vector3d& p, double step) {
   return (p / step).array().rint() * step;
 }
 
-/// Drops pieces of a closed surface that are thinner than rounding: gaps between faces that have
-/// their corners in common, and what pressing left.
+/// Drops pieces of a closed surface that are thinner than rounding: gaps between faces with common
+/// corners, and remainders of pressing.
 void drop_flat_pieces(TriangleMesh& mesh, double thinnest, const Eigen::Vector3d& from) {
   const SidePartners partners =
       nearest_partners(mesh.vertices, mesh.triangles, EdgeTable(mesh.triangles));
@@ -247,7 +247,7 @@ class Resolver {
     from_ = closed.mesh.vertices[triangles_[0][0]];
   }
 
-  /// The resolved surface; nothing where the mesh is one as it is.
+  /// The resolved surface; nothing if the mesh needs no change.
   std::optional<TriangleMesh> surface(Resolution& resolution) const {
     std::vector<bool> changed(triangles_.size(), false);  // by group
     const std::vector<std::uint32_t> groups = groups_of(triangles_, pairs_);
@@ -299,7 +299,7 @@ class Resolver {
     return made;
   }
 
-  /// Closes the surface and compares its volume with what the mesh counts.
+  /// Closes the surface and compares its volume with that of the mesh.
   ClosedMesh close(TriangleMesh surface, Resolution& resolution) const {
     ClosedMesh result = close_oriented(std::move(surface), closed_.name);
     if (find_unbalanced_edge(result.mesh.triangles, EdgeTable(result.mesh.triangles)))
@@ -312,7 +312,7 @@ class Resolver {
       throw Unresolvable{"the volume of the resolved surface is " + shortest(after.sum) + ", not " +
                          shortest(expected)};
     for (double* const counted : {&resolution.counted_twice, &resolution.counted_against})
-      if (*counted <= rounding + 1e-15 * before.size) *counted = 0;  // below 0 too
+      if (*counted <= rounding + 1e-15 * before.size) *counted = 0;  // negative values too
     MeshReport& report = result.report;
     report.filled_holes = closed_.report.filled_holes;
     report.repaired = closed_.report.repaired;
@@ -333,7 +333,7 @@ class Resolver {
 
   const ClosedMesh& closed_;
   const Pressed& pressed_;
-  const std::vector<Eigen::Vector3d>& vertices_;  ///< where they stay
+  const std::vector<Eigen::Vector3d>& vertices_;  ///< before pressing
   const std::vector<Triangle>& triangles_;
   const Pairs& pairs_;
   Arrangement arrangement_;
@@ -386,8 +386,8 @@ ResolvedMesh resolve_watched(ClosedMesh closed, WatchedWork& work) {
 }  // namespace
 
 ResolvedMesh resolve(ClosedMesh closed, const ProgressCallback& progress) {
-  // One shell that meets itself nowhere. (Faces that lie on each other belong to several, or they
-  // share edges, or some were one already.)
+  // Requires a single shell without self-intersections. (Touching faces belong to several shells,
+  // share edges, or were merged.)
   const MeshReport& report = closed.report;
   if (closed.meeting_pairs && closed.meeting_pairs->empty() && report.shells == 1 &&
       report.nonmanifold_edges == 0 && report.coincident_triangles == 0)

@@ -15,8 +15,8 @@ namespace {
 /// A closed ring of vertices, counter-clockwise seen from +z (or along the direction of the sweep).
 using Ring = std::vector<std::uint32_t>;
 
-/// Puts meshes together from rings. Coordinates are rounded to multiples of 2^-30, so that a sample
-/// does not depend on the last bit of this machine's sin and cos.
+/// Builds meshes from rings. Coordinates are rounded to multiples of 2^-30, so that a sample does
+/// not depend on the last bit of the platform's sin and cos.
 class MeshBuilder {
  public:
   std::uint32_t vertex(double x, double y, double z) {
@@ -28,7 +28,7 @@ class MeshBuilder {
     mesh_.triangles.push_back({a, b, c});
   }
 
-  /// Ring of `n` vertices about the z axis; `radius(i)` gives the radius of the i-th.
+  /// A ring of `n` vertices about the z axis; `radius(i)` is the radius of the i-th.
   template <class Radius>
   Ring ring(std::size_t n, double z, Radius radius) {
     Ring result(n);
@@ -39,7 +39,7 @@ class MeshBuilder {
     return result;
   }
 
-  /// Wall between two rings of equal length, outward where `upper` follows `lower` along +z.
+  /// A wall between two rings of equal length, outward if `upper` follows `lower` along +z.
   void wall(const Ring& lower, const Ring& upper) {
     for (std::size_t i = 0, n = lower.size(); i < n; ++i) {
       const std::size_t j = (i + 1) % n;
@@ -48,12 +48,12 @@ class MeshBuilder {
     }
   }
 
-  /// Cap from a ring to its apex, facing +z.
+  /// A cap from a ring to its apex, facing +z.
   void cap_up(const Ring& ring, std::uint32_t apex) {
     for (std::size_t i = 0, n = ring.size(); i < n; ++i) triangle(apex, ring[i], ring[(i + 1) % n]);
   }
 
-  /// Cap from a ring to its apex, facing −z.
+  /// A cap from a ring to its apex, facing −z.
   void cap_down(const Ring& ring, std::uint32_t apex) {
     for (std::size_t i = 0, n = ring.size(); i < n; ++i) triangle(apex, ring[(i + 1) % n], ring[i]);
   }
@@ -137,7 +137,7 @@ TriangleMesh revolve(const std::vector<std::pair<double, double>>& profile, doub
 constexpr std::size_t kColumns = 60;  // a multiple of six: every corner of a hexagon has a column
 constexpr double kHexagon = 7.5;      // half the width across flats
 
-/// Fractions of a pitch at which the profile has its corners: root, flank, crest, flank.
+/// Fractions of a pitch at the profile's corners: root, flank, crest, flank.
 constexpr std::array kCorners = {0.1, 0.5, 0.6, 1.0};
 
 double profile(double turns) {
@@ -161,7 +161,7 @@ struct Column {
 
 Column add_column(MeshBuilder& builder, std::size_t i, double bottom, double top,
                   double clearance) {
-  constexpr double kTolerance = 1e-6;  // a corner this close to an end is the end
+  constexpr double kTolerance = 1e-6;  // a corner this close to an end is merged with it
   const double turn = static_cast<double>(i) / kColumns;
   Column column;
   const auto add = [&](double z) {
@@ -196,8 +196,8 @@ std::pair<Ring, Ring> add_thread(MeshBuilder& builder, double bottom, double top
     const Column& right = columns[(i + 1) % kColumns];
     rings.first.push_back(left.vertex.front());
     rings.second.push_back(left.vertex.back());
-    // Climb both columns; the step goes to the side whose next vertex comes first along the
-    // thread, where the right column is 1/kColumns of a turn ahead.
+    // Advances along both columns; the step goes to the side whose next vertex comes first along
+    // the thread. The right column is 1/kColumns of a turn ahead.
     std::size_t a = 0, b = 0;
     while (a + 1 < left.z.size() || b + 1 < right.z.size()) {
       const bool left_done = a + 1 == left.z.size();

@@ -6,23 +6,23 @@
 
 namespace ist {
 
-/// A closed mesh that is made on the spot: outward, without self-intersections. Lengths are [u];
-/// every sample is a few units across.
+/// A closed mesh that is generated: outward, without self-intersections. Lengths are [u]; every
+/// sample is a few units across.
 struct Sample {
   const char* name;
   const char* description;
   TriangleMesh (*make)();
 };
 
-/// All samples, in the order they are listed to a user.
+/// All samples, in the order in which they are listed to a user.
 std::span<const Sample> samples();
 
-/// The mesh of a sample. Throws Error that lists the names there are.
+/// The mesh of a sample. Throws Error that lists the valid names.
 TriangleMesh make_sample(std::string_view name);
 
-// The numbers behind the bolt and the nut, for those who turn one in the other. Both stand on the
-// z axis: the bolt's thread from z = 0 to 16, the nut from −4 to 4. The nut fits wherever it is
-// moved by t along z and turned by 2π t / kThreadPitch about it, and collides half a pitch off.
+// The dimensions of the bolt and the nut, for turning one in the other. Both are on the z axis: the
+// bolt's thread from z = 0 to 16, the nut from −4 to 4. The nut fits wherever it is moved by t
+// along z and rotated by 2π t / kThreadPitch about it, and collides half a pitch off.
 inline constexpr double kThreadPitch = 2.0;  ///< [u] along z per turn, right-handed
 inline constexpr double kThreadMajor = 5.0;  ///< [u] radius of the bolt's crests
 inline constexpr double kThreadMinor = 4.0;  ///< [u] radius of the bolt's roots
@@ -31,7 +31,7 @@ inline constexpr double kThreadClearance =
 
 }  // namespace ist
 
-// One function a sample; samples.cpp lists them for the user.
+// One function per sample; samples.cpp lists them for the user.
 namespace ist::shapes {
 
 TriangleMesh box(const Eigen::Vector3d& half_extent);

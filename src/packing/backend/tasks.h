@@ -5,14 +5,14 @@
 
 #include "mesh/hierarchy/line_lattice.h"
 
-// Tasks for a backend besides packing, and their results: plain data in the solid's unit frame.
+// Tasks for a backend other than packing, and their results: plain data in the solid's unit frame.
 
 namespace ist {
 
-/// Where a solid is cut into columns along x: column (i, j) stands for `step_y` × `step_z` of
+/// The division of a solid into columns along x: column (i, j) stands for `step_y` × `step_z` of
 /// cross-section (docs/design.md 5, 1). Row j is shifted along y by an irrational part of the step,
-/// so that no straight edge of the solid keeps pace with the lattice, and every row still has
-/// exactly one column in each step of the box.
+/// so that no straight edge of the solid aligns with the lattice, and every row still has exactly
+/// one column in each step of the box.
 struct ColumnPlan {
   LineLattice lines;
   double x0 = 0, x1 = 0;  ///< extent of the solid, unit frame
@@ -45,10 +45,10 @@ struct CoverBall {
   double radius = 0;  ///< unit frame, before extension
 };
 
-/// Balls that are to cover the solid.
+/// Balls that must cover the solid.
 struct CoverTask {
-  std::span<const CoverBall> balls;  ///< radius: of the sphere, before it is enlarged
-  double slack = 0;                  ///< by which every ball is enlarged, unit frame
+  std::span<const CoverBall> balls;  ///< radius: of the sphere, before enlargement
+  double slack = 0;                  ///< enlargement of every ball, unit frame
   double middle[3] = {};             ///< of the first cell, unit frame
   double half = 0;                   ///< its half edge
 };

@@ -6,15 +6,14 @@
 
 namespace ist::packing {
 
-/// The next step of a band.
 enum class BandStep : std::uint32_t {
-  work,     ///< a band: work on the cells whose bound reaches the margin
-  restart,  ///< forget all cells and begin at the root; spheres and grid stay
+  work,     ///< process the cells whose bound reaches the margin
+  restart,  ///< drop all cells and begin at the root; spheres and grid stay
   stop,
 };
 
-/// All decisions of the banded packing (docs/design.md 4.2) as one plain state that the CPU loop
-/// and a GPU kernel drive alike. Everything it is told is a maximum or a count of a set.
+/// All decisions of the banded packing (docs/design.md 4.2) in one plain state that drives both the
+/// CPU loop and the GPU kernel. All its inputs are maxima or counts of sets.
 ///
 ///   rebuild the grid for (grid_spheres, grid_reach); cells = {root}
 ///   loop:
@@ -24,23 +23,24 @@ enum class BandStep : std::uint32_t {
 ///     rounds: resolve active (plateau(), largest_half(), classes(), …), insert, end_round()
 ///     end_band()
 struct BandSchedule {
-  static constexpr float kSmallestRadius = 0x1p-23f;  ///< float coordinates resolve nothing below
+  static constexpr float kSmallestRadius =
+      0x1p-23f;  ///< smaller radii cannot be resolved by float coordinates
   static constexpr float kLastSlack = 0.01f;
-  static constexpr float kLargest = 1.5f;  ///< half-edge of a cell that is climbed from, in radii
+  static constexpr float kLargest = 1.5f;  ///< half-edge of a cell whose ascent may start, in radii
   static constexpr std::uint64_t kMostCells = std::uint64_t{1} << 22;  ///< 80 B each
 
   PackingLimits limits;
-  double volume_unit = 0x1p-58;     ///< [unit-frame³] of the integers that volumes are summed in
+  double volume_unit = 0x1p-58;  ///< [unit-frame³] unit of the integers in which volumes are summed
   std::uint64_t volume_wanted = 0;  ///< target, in volume_unit
 
   float threshold = 4;            ///< radius that a candidate of this band reaches
   float margin = 0;               ///< bound below which a cell settles
-  float floor = kSmallestRadius;  ///< bound below which a cell cannot matter
-  float dropped = 0;              ///< largest bound of the cells that the floor took
+  float floor = kSmallestRadius;  ///< cells with a smaller bound are irrelevant
+  float dropped = 0;              ///< largest bound of the cells below the floor
 
   float grid_reach = 2;
   std::uint64_t grid_spheres = 0;  ///< count when the grid was laid out
-  bool rebuild_grid = false;       ///< set by begin_band(): lay it out anew, for these
+  bool rebuild_grid = false;       ///< set by begin_band(): lay the grid out for these
 
   std::uint64_t spheres = 0;
   std::uint64_t covered = 0;  ///< in volume_unit
@@ -63,8 +63,8 @@ struct BandSchedule {
     return part < 1 ? part : 1;
   }
 
-  /// Sets `floor`: the forecast of the last sphere's radius, with a margin. Where it turns out too
-  /// high, the packing starts again at the root cell with the spheres it has.
+  /// Sets `floor`: the forecast of the last sphere's radius, with a margin. If it proves too high,
+  /// the packing restarts at the root cell with the spheres that it has.
   IST_HD void begin_cleaning() {
     floor = kSmallestRadius;
     if (strict() || !forecast || limits.max_spheres == 0 || spheres < 64) return;
@@ -73,7 +73,7 @@ struct BandSchedule {
     if (radius > floor) floor = radius;
   }
 
-  /// A cell with this bound was taken by the floor.
+  /// Records that a cell with this bound was dropped below the floor.
   IST_HD void drop(float bound) {
     if (bound > dropped) dropped = bound;
   }
@@ -82,7 +82,7 @@ struct BandSchedule {
   IST_HD BandStep begin_band(float top) {
     rebuild_grid = false;
     if (dropped >= kSmallestRadius && top < dropped) {
-      // The forecast was too high, and what it dropped is needed: find it again.
+      // The forecast was too high, and the dropped cells are needed: restart.
       forecast = false;
       dropped = 0;
       return BandStep::restart;
@@ -101,31 +101,31 @@ struct BandSchedule {
     threshold = (1 - slack) * top;
     if (threshold < kSmallestRadius) return stop(StopReason::exhausted);
     if (double{threshold} <= limits.min_radius) {
-      // The last bands are cut at the smallest radius and end a hair above it.
+      // The last bands are limited by the smallest radius and end slightly above it.
       threshold = smallest_wanted();
       slack = kLastSlack;
     }
-    // A cell with a half-diagonal below a quarter of the margin settles or gets a candidate, for
-    // its bound exceeds its prototype's radius by no more than the half-diagonal.
+    // A cell with a half-diagonal below a quarter of the margin settles or gets a candidate, as its
+    // bound exceeds its prototype's radius by no more than the half-diagonal.
     margin = threshold * (1 + 0.5f * slack);
     spheres_before_band = spheres;
     return BandStep::work;
   }
 
-  /// Cells under work at once beyond which more of them cannot be needed: so many places are
+  /// If more cells than this are processed at once, further ones are not needed: so many places are
   /// equally good that any of them will do.
   IST_HD std::uint64_t plateau() const {
     const std::uint64_t left = limits.max_spheres > 0 ? limits.max_spheres - spheres : 10000;
     return 4096 + 16 * left;
   }
 
-  /// Half-edge up to which cells are climbed from, `frontier` of them being under work. On a
-  /// plateau cells are climbed from at any size, and split only where that fails.
+  /// The largest half-edge of cells from which an ascent starts, with `frontier` cells in progress.
+  /// On a plateau ascents start from cells of any size, and cells are split only if that fails.
   IST_HD float largest_half(std::uint64_t frontier) const {
     return frontier > plateau() ? 2 : kLargest * threshold;
   }
 
-  /// On a plateau a frontier is worked on in this many classes, one after the other.
+  /// On a plateau a frontier is processed in this many classes, one after the other.
   IST_HD std::uint32_t classes(std::uint64_t frontier) const {
     return frontier > plateau() ? static_cast<std::uint32_t>((frontier - 1) / plateau()) + 1 : 1;
   }
@@ -133,12 +133,13 @@ struct BandSchedule {
     return static_cast<std::uint32_t>(std::uint64_t{point_hash(centre, 0)} * classes >> 32);
   }
 
-  /// After a class: enough candidates. What is left of the frontier waits for the next band.
+  /// True after a class if there are enough candidates. The rest of the frontier waits for the next
+  /// band.
   IST_HD bool enough(std::uint64_t candidates) const { return candidates > plateau(); }
 
-  /// After a level, before its cells are split: bounds do not separate, and the next band asks for
-  /// less; or there are too many cells. `cells`: those that begin_band() left and all children
-  /// since then that reach the floor, whether split later or not.
+  /// Tests after a level, before its cells are split, whether to give up: bounds do not separate,
+  /// so the next band lowers the threshold; or there are too many cells. `cells`: those that
+  /// begin_band() left and all children since then that reach the floor, split or not.
   IST_HD bool gives_up(std::uint64_t splitting, std::uint64_t cells) {
     if (!strict() && splitting > 2 * plateau()) return true;
     if (cells <= kMostCells) return false;
@@ -146,7 +147,7 @@ struct BandSchedule {
     return true;
   }
 
-  /// Whether a winner's certified radius is worth inserting. If not, float overestimated the
+  /// True if a winner's certified radius is worth inserting. If not, float overestimated the
   /// clearance: the cell loses its prototype and gets refused_bound().
   IST_HD bool accepts(float r) const {
     if (r >= threshold) return true;
@@ -155,7 +156,7 @@ struct BandSchedule {
   }
   IST_HD float refused_bound() const { return 0.999f * margin; }
 
-  /// Counts an inserted sphere; stops the packing when it is the last that is wanted.
+  /// Counts an inserted sphere; stops the packing at the last one wanted.
   IST_HD void insert(float r) {
     ++spheres;
     covered += fixed_ball_volume(r, volume_unit);
@@ -165,10 +166,10 @@ struct BandSchedule {
       stop(StopReason::coverage);
   }
 
-  /// After a round that inserted so many; true if the band has another one.
+  /// Ends a round that inserted so many; true if the band has another one.
   IST_HD bool end_round(std::uint64_t inserted) {
     ++rounds;
-    // Under an explicit ε what is left must be refuted, not only found to yield nothing now.
+    // With an explicit ε the rest must be refuted, not merely found to yield nothing now.
     return !stopped && (inserted > 0 || (strict() && threshold > smallest_wanted()));
   }
 

@@ -13,7 +13,7 @@
 
 namespace ist::packing {
 
-/// Lists as they come. The result depends on no order; tests put another one in its place.
+/// Keeps the order of lists. The result does not depend on it; tests use another order.
 struct AsFound {
   using Spheres = GridSpheres;
   static void arrange(std::vector<std::uint32_t>&) {}
@@ -62,7 +62,7 @@ class BandedPacker {
   using Spheres = typename Order::Spheres;
   using Shape = PrototypeField<Surface, Spheres>;
   using Indices = std::vector<std::uint32_t>;
-  static constexpr std::size_t kChunk = 4096;  ///< cells between two looks at clock and progress
+  static constexpr std::size_t kChunk = 4096;  ///< cells between two checks of clock and progress
 
   void begin_at_root() {
     Cell root;
@@ -72,7 +72,7 @@ class BandedPacker {
     cell_count_ = 1;
   }
 
-  /// Removes the cells that cannot matter.
+  /// Removes irrelevant cells and returns the largest bound.
   float largest_live_bound() {
     spare_.clear();
     const auto dead = [this](const StoredCell<Feature>& c) {
@@ -87,7 +87,7 @@ class BandedPacker {
     return top;
   }
 
-  /// Inserts spheres of radius ≥ threshold until the band has given what it has.
+  /// Inserts spheres of radius ≥ threshold until the band yields no more.
   void band() {
     Indices active;
     for (std::size_t i = 0; i < cells_.size(); ++i)
@@ -99,7 +99,7 @@ class BandedPacker {
     }
   }
 
-  /// Works on the cells until each has settled or has a candidate; leaves the latter in `active`.
+  /// Processes the cells until each has settled or has a candidate; leaves the latter in `active`.
   void resolve(Indices& active) {
     const Spheres spheres(result_.spheres, grid_);
     const Shape field(surface_, spheres);
@@ -142,7 +142,7 @@ class BandedPacker {
     }
   }
 
-  /// Replaces each cell by its children that still count; those that reach the margin go to
+  /// Replaces each cell by its children that still matter; those that reach the margin go to
   /// `unsettled`.
   void split(const Indices& parents, const Shape& field, Indices& unsettled) {
     std::vector<Cell> children(8 * std::min(parents.size(), kChunk));
@@ -184,7 +184,7 @@ class BandedPacker {
     return place;
   }
 
-  /// Inserts what wins among the candidates of the active cells; returns how many were inserted.
+  /// Inserts the winners among the candidates of the active cells; returns how many were inserted.
   std::size_t insert_independent(const Indices& active) {
     std::vector<Candidate> candidates(active.size());
     float top = schedule_.margin;
@@ -237,8 +237,8 @@ class BandedPacker {
   Stage& stage_;
   BandSchedule schedule_;
   std::vector<StoredCell<Feature>> cells_;
-  Indices spare_;               ///< places in cells_ of cells that were split
-  std::size_t cell_count_ = 0;  ///< as BandSchedule::gives_up() wants it
+  Indices spare_;               ///< indices in cells_ of cells that were split
+  std::size_t cell_count_ = 0;  ///< as BandSchedule::gives_up() counts
   SphereGrid grid_{{}, sphere_grid_layout(0, 2.0f)};
   SpherePacking result_;
   std::vector<float> kept_;

@@ -6,17 +6,17 @@
 
 namespace ist::packing {
 
-/// A converged prototype that wants to become a sphere.
+/// A converged prototype that may become a sphere.
 struct Candidate {
   Float3 centre;
   float radius = 0;
-  std::uint64_t key = 0;  ///< radius bits, then a hash of the cell: larger goes first
+  std::uint64_t key = 0;  ///< radius bits, then a hash of the cell: larger keys come first
   Float3 cell_centre;
 };
 
 /// Order of candidates: by radius, then by a hash of the cell's centre and the seed.
 IST_HD inline std::uint64_t candidate_key(float radius, Float3 cell_centre, std::uint64_t seed) {
-  // Positive floats order like their bits.
+  // Positive floats are ordered like their bits.
   return std::uint64_t{bits_of(radius)} << 32 | point_hash(cell_centre, seed);
 }
 
@@ -36,8 +36,8 @@ IST_HD inline bool overlap(const Candidate& a, const Candidate& b) {
   return x * x + y * y + z * z < r * r;
 }
 
-/// A hash table of cubes as wide as two candidates can overlap: those that may overlap one stand in
-/// its bucket or the 26 around it. Which strangers share a bucket does not matter.
+/// A hash table of cubes that are as wide as two candidates can overlap: overlapping candidates are
+/// in the same bucket or in the 26 around it. Other candidates in a bucket do no harm.
 struct CandidateBuckets {
   float inverse_width = 1;
   std::uint32_t mask = 63;  ///< count − 1, count a power of two
@@ -63,13 +63,13 @@ IST_HD inline CandidateBuckets candidate_buckets(float largest, std::uint64_t co
   return buckets;
 }
 
-/// A candidate that none before it overlaps.
+/// A candidate that no preceding candidate overlaps.
 struct Winner {
   std::uint32_t index = 0;  ///< among the candidates
-  double gap = 0;           ///< to the winners that go before it, see gap_to_sphere()
+  double gap = 0;           ///< to the preceding winners, see gap_to_sphere()
 };
 
-/// The candidates that no candidate that goes before them overlaps, in that order.
+/// The candidates that no preceding candidate overlaps, in order.
 std::vector<Winner> select_independent(const std::vector<Candidate>& candidates);
 
 }  // namespace ist::packing

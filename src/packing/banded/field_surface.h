@@ -5,12 +5,12 @@
 
 namespace ist::packing {
 
-/// The surface of any Solid, known by its signed distance alone. Features are balls: a value s at q
-/// bounds the field by s − |x − q| everywhere (it is 1-Lipschitz), which is the ball {q, s}; taken
-/// where the gradient leads to the surface, it is a surface point.
+/// The surface of any Solid with a signed distance. Features are balls: a value s at q bounds the
+/// field by s − |x − q| everywhere (it is 1-Lipschitz), which is the ball {q, s}; at the foot of
+/// the gradient it is a surface point.
 class FieldSurface {
  public:
-  /// A search of a field finds one feature, so an ascent must take more steps to know them all.
+  /// A search finds only one feature, so an ascent must take more steps to find them all.
   static constexpr int kAscentSteps = 8;
 
   struct Feature {
@@ -33,12 +33,11 @@ class FieldSurface {
     return {feature, static_cast<float>(std::fabs(s)), true};
   }
 
-  /// Where x stands to a remembered feature.
   FeatureOffset offset(const Feature& feature, Float3 x) const {
     return ball_offset(feature.centre, feature.radius, kSurfaceTag, x);
   }
 
-  /// Nothing is known of faces.
+  /// A field has no known faces.
   template <class Team>
   int convex_planes(const Team&, Float3, float, bool, Feature*, int, SampleMemory*, int) const {
     return 0;

@@ -7,12 +7,12 @@ namespace ist::packing {
 /// Result of maximise_clearance().
 struct ClearanceOptimum {
   float value = 0;  ///< ≥ max over the box of min over the constraints, whatever the rounding
-  Float3 y;         ///< where the linear model is greatest, inside the box
+  Float3 y;         ///< the maximum of the linear model, inside the box
 };
 
 constexpr int kMostPivots = 24;
 constexpr float kTolerance = 1e-5f;   ///< of a violation, in half-edges of the box
-constexpr float kLeastPivot = 1e-5f;  ///< below it an element of the basis counts as 0
+constexpr float kLeastPivot = 1e-5f;  ///< a smaller element of the basis counts as 0
 
 /// The bound that the multipliers prove. `sums`: of λ, λb, λ·gradient; z: the vertex (t, y).
 IST_HD inline ClearanceOptimum optimum_of(float first_value, const float sums[5], const float z[4],
@@ -29,11 +29,10 @@ IST_HD inline ClearanceOptimum optimum_of(float first_value, const float sums[5]
   return optimum;
 }
 
-/// maximise_clearance() by a team of at least 32 lanes, the same arithmetic: a row a lane, in
-/// registers, and lane 4 i + k of every 16 has element (i, k) of the basis' inverse and what
-/// belongs to slot k (SimplexBasis). All lanes know the vertex z. Rows are named by numbers:
-/// constraints from 0 on, side +y_k of the box −6 + 2 k, side −y_k one more; the first lanes
-/// have the sides.
+/// maximise_clearance() by a team of at least 32 lanes, with the same arithmetic: each lane keeps a
+/// row in registers, and lane 4 i + k of every 16 keeps element (i, k) of the basis' inverse and
+/// the data of slot k (SimplexBasis). All lanes know the vertex z. Rows are numbered: constraints
+/// from 0 on, side +y_k of the box −6 + 2 k, side −y_k one more; the first lanes have the sides.
 template <class Team>
 IST_HD_ONCE ClearanceOptimum maximise_by_lanes(const Team& team, const SampleMemory* sample,
                                                int count, float a, float h2) {
@@ -74,7 +73,8 @@ IST_HD_ONCE ClearanceOptimum maximise_by_lanes(const Team& team, const SampleMem
 
   const float tolerance = kTolerance * a;
   IST_ROLLED for (int pivot = 0; pivot < kMostPivots; ++pivot) {
-    // Entering row: the most violated, then the smallest tag. Numbers ≥ 0 order as their bits do.
+    // Entering row: the most violated, then the smallest tag. Numbers ≥ 0 are ordered like their
+    // bits.
     const float slack = level + n0 * z1 + n1 * z2 + n2 * z3 - unit * z0;
     const std::uint32_t beyond = slack < 0 ? bits_of(-slack) : 0;
     const std::uint32_t most = team.max(beyond);
@@ -134,10 +134,10 @@ IST_HD_ONCE ClearanceOptimum maximise_by_lanes(const Team& team, const SampleMem
   return optimum_of(first_value, sums, z, a);
 }
 
-/// The basis of the linear program in maximise_clearance(): four rows, of constraints (≥ 0) and of
-/// the box's sides (−1 … −6: +x −x +y −y +z −z), one in each slot. z = (t, y) is the vertex where
-/// they meet, column k of `inverse` answers to slot k, `lambda` are multipliers. Sums go in pairs,
-/// (0 + 1) + (2 + 3), so that lanes may share them (maximise_by_lanes).
+/// The basis of the linear program in maximise_clearance(): four rows, constraints (≥ 0) or the
+/// box's sides (−1 … −6: +x −x +y −y +z −z), one in each slot. z = (t, y) is the vertex where they
+/// meet, column k of `inverse` belongs to slot k, `lambda` are multipliers. Sums are formed in
+/// pairs, (0 + 1) + (2 + 3), so that lanes may share them (maximise_by_lanes).
 struct SimplexBasis {
   int row[4];
   float z[4], lambda[4], inverse[4][4];
@@ -153,7 +153,7 @@ struct SimplexBasis {
     *this = at;
   }
 
-  /// Takes in the row `entering`, violated by `worst`, and drops one. False if none can leave.
+  /// Adds the row `entering`, violated by `worst`, and drops one. False if none can leave.
   IST_HD bool exchange(const SampleMemory& constraints, int entering, float worst) {
     float r[4] = {0, 0, 0, 0};
     if (entering >= 0) {
@@ -205,16 +205,16 @@ struct SimplexBasis {
   }
 };
 
-/// Maximises min_i (distance_i + curvature_i·h2 + gradient_i·y) over the box |y_k| ≤ a. `count`
-/// ≥ 1. With h2 = 3a² the value bounds every clearance in the box (Constraint); with h2 = 0 it is
-/// the linear model that the ascent follows.
+/// Maximises min_i (distance_i + curvature_i·h2 + gradient_i·y) over the box |y_k| ≤ a. `count` ≥
+/// 1. With h2 = 3a² the value bounds every clearance in the box (Constraint); with h2 = 0 it is the
+/// linear model that the ascent follows.
 ///
 /// A linear program in (t, y): max t, t − gradient_i·y ≤ b_i, ±y_k ≤ a. Dual simplex from the
-/// constraint that alone is tightest; every basis in between is dual feasible, so stopping early
-/// still gives a bound. The value is formed at the end from the multipliers by weak duality,
-/// Σλ_i b_i + a‖Σλ_i gradient_i‖₁ with Σλ_i = 1, which holds for any λ ≥ 0: rounding in the
-/// pivots can only loosen it. Ties go to the smallest tag, so the result is a function of the set
-/// of constraints. `sample`: its constraints.
+/// tightest single constraint; every basis in between is dual feasible, so stopping early still
+/// gives a bound. The value is computed at the end from the multipliers by weak duality, Σλ_i b_i +
+/// a‖Σλ_i gradient_i‖₁ with Σλ_i = 1, which holds for any λ ≥ 0: rounding in the pivots can only
+/// loosen it. Ties are broken by the smallest tag, so the result is a function of the set of
+/// constraints. `sample`: its constraints.
 template <class Team>
 IST_HD ClearanceOptimum maximise_clearance(const Team& team, const SampleMemory* sample, int count,
                                            float a, float h2) {

@@ -6,13 +6,13 @@
 
 namespace ist::packing {
 
-/// The surface of a mesh on the host, as packing asks it.
+/// The surface of a mesh on the host, in the form that packing uses.
 class MeshSurface : public TriangleSurface<MeshSurface> {
  public:
   explicit MeshSurface(const MeshSolid& solid) : solid_(solid), view_(solid.view()) {}
 
-  /// Unsigned distance to the surface, and the feature there, if it is less than `limit` or just
-  /// that. Among equals the triangle with the smallest index.
+  /// Unsigned distance to the surface, and the feature there, if it is at most `limit`. Among
+  /// equals the triangle with the smallest index.
   template <class Team>
   NearestFeature<Feature> nearest(const Team&, Float3 x, float limit) const {
     const float p[3] = {x.x, x.y, x.z};
@@ -35,7 +35,8 @@ class MeshSurface : public TriangleSurface<MeshSurface> {
     return triangle_of(view_.blocks[feature / kBvhWidth], feature % kBvhWidth);
   }
 
-  /// All triangles whose distance² is at most radius2; returns how many, −1 if more than `most`.
+  /// Finds all triangles whose distance² is at most radius2; returns their number, −1 if more than
+  /// `most`.
   template <class Team>
   int triangles_within(const Team& team, Float3 x, float radius2, Feature* out, int most) const {
     const float p[3] = {x.x, x.y, x.z};

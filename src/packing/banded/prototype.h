@@ -6,17 +6,16 @@
 
 namespace ist::packing {
 
-/// Outcome of working on a cell.
 enum class CellState : std::uint8_t {
   settled,    ///< bound below the margin
   candidate,  ///< prototype's radius reaches the threshold
-  split,      ///< neither: look closer
+  split,      ///< neither: subdivide
   open,       ///< not yet known
 };
 
 constexpr int kMostPlaneTriangles = 32;  ///< of a convex neighbourhood
 
-/// Memory that a team's lanes share while they work on one cell, besides their registers.
+/// Memory that a team's lanes share while they process one cell, besides their registers.
 template <class Feature>
 struct CellScratch {
   SampleMemory sample[2];
@@ -24,7 +23,7 @@ struct CellScratch {
   Feature triangle[kMostPlaneTriangles];  ///< of a convex neighbourhood
 };
 
-/// Takes a cell up for work: its ring goes to the scratch.
+/// Begins work on a cell: copies its ring to the scratch.
 template <class Team, class Feature>
 IST_HD Cell load_cell(const Team& team, const StoredCell<Feature>& from,
                       CellScratch<Feature>& scratch) {
@@ -45,10 +44,9 @@ IST_HD void store_cell(const Team& team, const Cell& cell, const CellScratch<Fea
     to.ring[i] = team.memory(scratch.ring)[i];
 }
 
-/// The part of packing that works on one cell at a time: bounds and ascents, by a team. Const, so
-/// any number of teams may share it; each has its own scratch. Surface and Spheres are views:
-///   Surface: see MeshSurface. Spheres: count(), reach(), for_near(team, x, visit), see
-///   GridSpheres.
+/// The part of packing that processes one cell at a time: bounds and ascents, by a team. Const, so
+/// any number of teams may share it; each has its own scratch. Surface and Spheres are views.
+/// Surface: see MeshSurface. Spheres: count(), reach(), for_near(team, x, visit), see GridSpheres.
 template <class Surface, class Spheres>
 class PrototypeField {
  public:
@@ -58,15 +56,15 @@ class PrototypeField {
   IST_HD PrototypeField(const Surface& surface, const Spheres& spheres)
       : surface_(surface), spheres_(spheres) {}
 
-  /// A cell's bound, and where it is attained, off the centre; 0 if not worked out.
+  /// A cell's bound, and where it is attained, relative to the centre; 0 if not computed.
   struct Bounded {
     Sample sample;  ///< at the centre, of spheres and remembered features
     float bound = 0;
     Float3 y;
   };
 
-  /// Brings the cell's bound and prototype up to date with all spheres. The cell settles below
-  /// `margin` ≥ threshold; cells with a half-edge above `largest` are only bounded.
+  /// Updates the cell's bound and prototype for all spheres. The cell settles below `margin` ≥
+  /// threshold; cells with a half-edge above `largest` are only bounded.
   template <class Team>
   IST_HD CellState work(const Team& team, Cell& cell, Scratch& scratch, float threshold,
                         float margin, float largest) const {
@@ -109,9 +107,9 @@ class PrototypeField {
             cell.bound, y};
   }
 
-  /// The second part: the centre's side, the surface about it, and the bound that follows. `open`
-  /// if the cell is to be climbed from; until then its prototype is where the bound is attained,
-  /// off the centre, and its radius the centre's clearance.
+  /// The second part: the centre's side, the surface about it, and the resulting bound. `open` if
+  /// an ascent is to start from the cell; until then its prototype stores the point where the bound
+  /// is attained, relative to the centre, and its radius the centre's clearance.
   template <class Team>
   IST_HD CellState confine(const Team& team, Cell& cell, Scratch& scratch, Bounded seen,
                            float margin, float largest) const {
@@ -128,7 +126,7 @@ class PrototypeField {
       cell.bound = lowered(cell.bound, h - near.distance);
       if (cell.bound < margin || bounded_by_planes(team, cell, scratch, margin, seen.sample))
         return CellState::settled;
-      // Only cells that are to be climbed from whatever their size.
+      // Only for cells from which ascents start whatever their size.
       return near.found && near.distance < h && largest >= 1 ? CellState::open : CellState::split;
     }
     const View view = look_at_surface(team, x, {seen.sample, cell.surface_at_least});
@@ -149,8 +147,8 @@ class PrototypeField {
   }
 
   /// The last part: an ascent from the point that attains the cell's bound, if that is certainly
-  /// inside and better than the centre. If the centre is outside the solid, it starts just behind
-  /// the last remembered surface point: walls much thinner than the cell are reached only so.
+  /// inside and better than the centre. If the centre is outside the solid, the ascent starts just
+  /// behind the last remembered surface point: only this reaches walls much thinner than the cell.
   template <class Team>
   IST_HD CellState climb(const Team& team, Cell& cell, Scratch& scratch, float threshold) const {
     SampleMemory* const at = &scratch.sample[0];
@@ -189,7 +187,7 @@ class PrototypeField {
     return cell.radius >= threshold ? CellState::candidate : CellState::split;
   }
 
-  /// The k-th child of a cell, bounded by the spheres and the features that it inherits: `ring`,
+  /// The k-th child of a cell, bounded by the spheres and the features that it inherits. `ring`,
   /// the parent's, is unchanged and is the child's too. `at`: scratch memory.
   template <class Team>
   IST_HD Cell child(const Team& team, const Cell& parent, int k, const Feature* ring,
@@ -205,14 +203,13 @@ class PrototypeField {
 
  private:
   static constexpr float kSqrt3 = 1.7320510f;  // rounded up
-  static constexpr float kWindow = 4;          // × half-edge: 2√3 and some
+  static constexpr float kWindow = 4;          // × half-edge: 2√3 and a margin
   static constexpr float kHope = 6;
   static constexpr int kSpare = kRingCapacity + 1;
   static constexpr float kSmallestHalfEdge = 0x1p-23f;
 
   // The steps pass their results by value: the device keeps them in registers.
 
-  /// Spheres and surface as sampled from a point.
   struct View {
     Sample sample;
     float surface_at_least = 0;  ///< lower bound of the point's distance to the surface
@@ -220,7 +217,7 @@ class PrototypeField {
     Feature feature{};
   };
 
-  /// The bound only falls; float errors of the field are allowed for.
+  /// Lowers a bound, never raises it, and allows for the field's float errors.
   IST_HD static float lowered(float bound, float to) {
     to = to * (1 + 2e-6f);
     return to < bound ? to : bound;
@@ -308,12 +305,12 @@ class PrototypeField {
     return s;
   }
 
-  /// Searches the surface for what is closer than everything seen from x.
+  /// Searches the surface for features closer than everything found from x.
   template <class Team>
   IST_HD View look_at_surface(const Team& team, Float3 x, View view) const {
     view.found = false;
     if (view.surface_at_least >= view.sample.clearance) return view;
-    // The search compares squares: a remembered feature may come back at the very same distance.
+    // The search compares squares, so it may return a remembered feature at the very same distance.
     const auto near = surface_.nearest(team, x, view.sample.clearance);
     view.found = near.found && near.distance < view.sample.clearance;
     if (view.found) {
@@ -337,7 +334,7 @@ class PrototypeField {
     return view;
   }
 
-  /// Samples at x, and remembers what was found.
+  /// Samples at x, and remembers the features found.
   template <class Team>
   IST_HD View look(const Team& team, Float3 x, float window, float surface_at_least, Cell& cell,
                    Scratch& scratch, SampleMemory* at) const {
@@ -346,13 +343,13 @@ class PrototypeField {
     return view;
   }
 
-  /// Climbs from x by sequential linear programs in a trust box that never reaches the surface. The
-  /// linear model bounds the known features from below: a step fails only over others.
+  /// Ascends from x by sequential linear programs in a trust box that never reaches the surface.
+  /// The linear model bounds the known features from below, so a step fails only because of others.
   template <class Team>
   IST_HD void ascend(const Team& team, Float3& x, float trust, float threshold, Cell& cell,
                      Scratch& scratch, View& view) const {
     constexpr int kSteps = Surface::kAscentSteps;
-    bool far = false;  // from the top: the last step gained much
+    bool far = false;  // seen from the top: the last step gained much
     IST_ROLLED for (int step = 0;
                     (step < kSteps || (far && step < 2 * kSteps)) && view.sample.size > 0; ++step) {
       const Sample& s = view.sample;
@@ -373,7 +370,7 @@ class PrototypeField {
         trust = 2 * box;
       } else {
         trust = 0.25f * box;
-        // The features found there warn the model here.
+        // The features found there limit the model here.
         view = look(team, x, kWindow * box, view.surface_at_least, cell, scratch, s.at);
       }
     }

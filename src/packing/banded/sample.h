@@ -19,18 +19,18 @@ struct Constraint {
   Float3 gradient;        ///< unit vector away from the feature; 0 at the feature itself
   float distance = 0;     ///< signed: negative inside a sphere
   float curvature = 0;    ///< 1/(2l), l the distance to the sphere's centre or to the closest point
-  std::uint32_t tag = 0;  ///< whose it is: settles ties where order may not
+  std::uint32_t tag = 0;  ///< identifies the feature: breaks ties independently of the order
 };
 
 // Tags: a sphere's is its index; a triangle's and its plane's are these with the triangle's index.
 constexpr std::uint32_t kSurfaceTag = 0x80000000u;
 constexpr std::uint32_t kPlaneTag = 0xC0000000u;
 
-/// Where a point stands to a feature that is a ball about its closest point.
+/// The offset of a point from a feature that is a ball about its closest point.
 struct FeatureOffset {
-  Float3 away;       ///< from the closest point, a sphere's centre, to the query
+  Float3 away;       ///< from the closest point, or a sphere's centre, to the query
   float range2 = 0;  ///< |away|²
-  float radius = 0;  ///< of a sphere; 0 of a surface
+  float radius = 0;  ///< of a sphere; 0 for a surface
   std::uint32_t tag = 0;
 };
 
@@ -38,7 +38,7 @@ struct FeatureOffset {
 template <class Feature>
 struct NearestFeature {
   Feature feature{};
-  float distance = 0;  ///< of the feature; the limit where there is none
+  float distance = 0;  ///< of the feature; the limit if there is none
   bool found = false;
 };
 
@@ -48,14 +48,14 @@ IST_HD inline FeatureOffset ball_offset(Float3 centre, float radius, std::uint32
   return {away, dot(away, away), radius, tag};
 }
 
-/// `range` = √range2.
 IST_HD inline Constraint constraint_of(const FeatureOffset& offset, float range) {
   const float inverse = range > 0 ? 1 / range : 0;
   return {inverse * offset.away, range - offset.radius, range > 0 ? 0.5f * inverse : 1e30f,
           offset.tag};
 }
 
-constexpr int kSampleCapacity = 26;  ///< with the sides of a cell, a row a lane (linear_program.h)
+constexpr int kSampleCapacity =
+    26;  ///< with the sides of a cell, one row a lane (linear_program.h)
 
 /// Constraints side by side, so that lanes read neighbouring words.
 struct SampleMemory {
@@ -85,19 +85,19 @@ IST_HD void put(const Team& team, SampleMemory* at, int i, const Constraint& c) 
   memory.tag[i] = c.tag;
 }
 
-/// The field around a point: its clearance (distance to what was looked at; ≤ 0 inside a sphere)
+/// The field around a point: its clearance (distance to the features searched; ≤ 0 inside a sphere)
 /// and the constraints of the features that can matter near it. Any subset of constraints gives a
-/// bound, so one that does not fit may be left out. The same in all lanes but for the memory.
+/// bound, so one that does not fit may be left out. The same in all lanes except for the memory.
 struct Sample {
   SampleMemory* at = nullptr;
   int size = 0;
   float clearance = 0;
 };
 
-constexpr float kFarAway = 3e38f;  ///< distance of what is not there
+constexpr float kFarAway = 3e38f;  ///< distance of missing features
 
 /// Index of the item with the least (value, tag) of all lanes; equal items are interchangeable.
-/// Lanes without one give kFarAway. `value` becomes the least.
+/// Lanes without an item pass kFarAway. `value` becomes the least.
 template <class Team>
 IST_HD int index_of_least(const Team& team, float& value, std::uint32_t tag, int index) {
   if constexpr (Team::kWidth == 1) return index;
@@ -123,7 +123,7 @@ IST_HD void add(const Team& team, const Constraint& c, Sample& s) {
   team.sync();
 }
 
-/// Forgets what is further than the nearest + window.
+/// Drops constraints further than the nearest + window.
 template <class Team>
 IST_HD_ONCE Sample keep_near(const Team& team, float window, Sample s) {
   const SampleMemory& memory = *team.memory(s.at);
@@ -149,15 +149,15 @@ IST_HD_ONCE Sample keep_near(const Team& team, float window, Sample s) {
   return s;
 }
 
-/// Adds one constraint to a sample that has `room` of them already, and drops the farthest by
+/// Adds one constraint to a full sample of `capacity` constraints, and drops the farthest by
 /// (distance, tag). All lanes know `c`.
 template <class Team>
-IST_HD void add_nearer(const Team& team, const Constraint& c, int room, const Sample& s) {
+IST_HD void add_nearer(const Team& team, const Constraint& c, int capacity, const Sample& s) {
   const SampleMemory& memory = *team.memory(s.at);
   float least = kFarAway;  // of the negated distances
   std::uint32_t tag = 0xFFFFFFFFu;
   int index = 0;
-  IST_ROLLED for (int i = team.lane(); i < room; i += Team::kWidth) {
+  IST_ROLLED for (int i = team.lane(); i < capacity; i += Team::kWidth) {
     const float value = -memory.distance[i];
     const std::uint32_t reversed = ~memory.tag[i];
     if (value < least || (value == least && reversed < tag)) {
@@ -175,7 +175,7 @@ IST_HD void add_nearer(const Team& team, const Constraint& c, int room, const Sa
 
 /// Adds the constraints of the lanes that have one, and keeps the nearest if not all fit.
 template <class Team>
-IST_HD_COLD Sample add_nearest(const Team& team, bool has, const Constraint& mine, int room,
+IST_HD_COLD Sample add_nearest(const Team& team, bool has, const Constraint& mine, int capacity,
                                Sample s) {
   IST_ROLLED for (int lane = 0; lane < Team::kWidth; ++lane) {
     if (team.broadcast(has ? 1 : 0, lane) == 0) continue;
@@ -185,8 +185,8 @@ IST_HD_COLD Sample add_nearest(const Team& team, bool has, const Constraint& min
     c.distance = team.broadcast(mine.distance, lane);
     c.curvature = team.broadcast(mine.curvature, lane);
     c.tag = team.broadcast(mine.tag, lane);
-    if (s.size == room) {
-      add_nearer(team, c, room, s);
+    if (s.size == capacity) {
+      add_nearer(team, c, capacity, s);
     } else {
       if (team.lane() == 0) put(team, s.at, s.size, c);
       ++s.size;
@@ -197,17 +197,17 @@ IST_HD_COLD Sample add_nearest(const Team& team, bool has, const Constraint& min
 }
 
 /// Samples the spheres near x: those no further than the nearest + window, and only the nearest of
-/// them if fewer than `spare` places would stay free. The grid's reach limits the search.
+/// them if fewer than `spare` entries would stay free. The grid's reach limits the search.
 template <class Team, class Spheres>
 IST_HD_ONCE Sample sample_spheres(const Team& team, Float3 x, const Spheres& spheres, float window,
                                   int spare, SampleMemory* at) {
   constexpr int kBatch = Team::kBatch;
   FeatureOffset offset[kBatch];
   float range[kBatch], distance[kBatch];
-  const int room = kSampleCapacity - spare;
+  const int capacity = kSampleCapacity - spare;
   int count = 0, batches = 0;
   Sample out{at, 0, spheres.reach()};
-  team.sync();  // all lanes are done with what was here before
+  team.sync();  // all lanes are done with the previous content
   const auto flush = [&] {
     float nearest = kFarAway;
     IST_ROLLED for (int i = 0; i < count; ++i) {
@@ -223,15 +223,15 @@ IST_HD_ONCE Sample sample_spheres(const Team& team, Float3 x, const Spheres& sph
       int total = 0;
       const int place = team.exclusive_count(near, total);
       if (total == 0) continue;
-      if (out.size + total > room) {
+      if (out.size + total > capacity) {
         team.sync();
         out = keep_near(team, window, out);
       }
-      if (out.size + total <= room) {
+      if (out.size + total <= capacity) {
         if (near) put(team, out.at, out.size + place, constraint_of(offset[i], range[i]));
         out.size += total;
       } else {
-        out = add_nearest(team, near, constraint_of(offset[i], range[i]), room, out);
+        out = add_nearest(team, near, constraint_of(offset[i], range[i]), capacity, out);
       }
     }
     count = 0;
@@ -245,7 +245,7 @@ IST_HD_ONCE Sample sample_spheres(const Team& team, Float3 x, const Spheres& sph
   if constexpr (kBatch > 1)
     if (count > 0) flush();
   team.sync();
-  // The first batch was measured by its own nearest.
+  // The first batch was filtered by its own nearest.
   return batches > 1 ? keep_near(team, window, out) : out;
 }
 

@@ -8,7 +8,6 @@
 namespace ist::packing {
 namespace {
 
-/// Candidates sorted into buckets.
 class Buckets {
  public:
   explicit Buckets(const std::vector<Candidate>& candidates) : candidates_(candidates) {

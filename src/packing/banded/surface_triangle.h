@@ -26,7 +26,7 @@ IST_HD SurfaceTriangle triangle_of(const Block& b, std::uint32_t lane) {
           b.triangle[lane]};
 }
 
-/// Where x stands to the triangle's closest point; range2 is what a search compares.
+/// The offset of x from the triangle's closest point; searches compare range2.
 IST_HD inline FeatureOffset triangle_offset(const SurfaceTriangle& t, Float3 x) {
   const Float3 d = x - t.origin;
   const float along_u = dot(d, t.u), along_v = dot(d, t.v), along_n = dot(d, t.n);
@@ -36,15 +36,17 @@ IST_HD inline FeatureOffset triangle_offset(const SurfaceTriangle& t, Float3 x) 
           kSurfaceTag | t.index};
 }
 
-/// Where the solid is locally an intersection of half-spaces, its faces' planes bound the clearance
-/// in a whole cell, however large the cell is next to its distance from them. Let S be all
-/// triangles within 3h of x. If each lies on the inner side of every other one's plane, the surface
-/// being closed, the solid near x is the intersection P of the half-spaces of S: beyond one of them
-/// there is none of it, and from a point of P within h of x the way straight to a plane no further
-/// than h from x meets the surface before that plane. Writes these planes as constraints behind the
-/// first `from` of `out`; returns how many, 0 if S is not so, too large, or they do not fit.
+/// If the solid is locally an intersection of half-spaces, its faces' planes bound the clearance in
+/// a whole cell, however large the cell is compared with its distance from them. Let S be all
+/// triangles within 3h of x. If each lies on the inner side of every other one's plane, then, as
+/// the surface is closed, the solid near x is the intersection P of the half-spaces of S: none of
+/// it is beyond a half-space, and from a point of P within h of x the straight segment to a plane
+/// no further than h from x meets the surface before that plane. Writes these planes as constraints
+/// behind the first `from` of `out`; returns their number, 0 if S does not qualify, is too large,
+/// or they do not fit.
 ///
-/// `surface`: triangles_within(), triangle(), inside_once(). `triangles`: room for `most` of them.
+/// `surface`: triangles_within(), triangle(), inside_once(). `triangles`: memory for `most` of
+/// them.
 template <class Team, class Surface>
 IST_HD int convex_planes(const Team& team, const Surface& surface, Float3 x, float h, bool x_inside,
                          typename Surface::Feature* triangles, int most, SampleMemory* out,
@@ -87,16 +89,17 @@ IST_HD int convex_planes(const Team& team, const Surface& surface, Float3 x, flo
   return written;
 }
 
-/// Base of MeshSurface and WideMeshSurface. Features are triangles, named by their places in the
-/// hierarchy's blocks; no answer depends on the hierarchy. All lanes of a team call its functions
-/// and get the same.
+/// Base of MeshSurface and WideMeshSurface. Features are triangles, identified by their positions
+/// in the hierarchy's blocks; no answer depends on the hierarchy. All lanes of a team call its
+/// functions and get the same result.
 template <class Surface>
 class TriangleSurface {
  public:
   using Feature = std::uint32_t;
-  static constexpr int kAscentSteps = 5;  ///< more cover no more (docs/packing_notes.md)
+  static constexpr int kAscentSteps =
+      5;  ///< more do not increase the coverage (docs/packing_notes.md)
 
-  /// Where x stands to a remembered feature; a lane's own.
+  /// The offset of x from a remembered feature; per lane.
   IST_HD FeatureOffset offset(Feature feature, Float3 x) const {
     return triangle_offset(self().triangle(feature), x);
   }
@@ -106,7 +109,7 @@ class TriangleSurface {
     return self().winding_number(team, x) >= 1;
   }
 
-  /// Inside by a winding number of 1: no other shell of the solid contains x.
+  /// True if the winding number is 1: no other shell of the solid contains x.
   template <class Team>
   IST_HD bool inside_once(const Team& team, Float3 x) const {
     return self().winding_number(team, x) == 1;

@@ -12,7 +12,7 @@ class WideMeshSurface : public TriangleSurface<WideMeshSurface> {
 
   template <class Team>
   IST_HD_ONCE NearestFeature<Feature> nearest(const Team& team, Float3 x, float limit) const {
-    const WideTree tree = tree_;  // a copy that no store can change stays in registers
+    const WideTree tree = tree_;  // a copy that stores cannot alias stays in registers
     const float p[3] = {x.x, x.y, x.z};
     const WideNearest found = ist::nearest(team, tree, p, limit * limit);
     return {found.slot, sqrtf(found.distance2), found.triangle != kNoTriangle};

@@ -9,7 +9,7 @@
 
 namespace ist::packing {
 
-/// Where a packing stops and what it is measured by; unit frame.
+/// The limits and the targets of a packing; unit frame.
 struct PackingLimits {
   double volume = 0;           ///< of the solid
   double target_coverage = 1;  ///< of the volume
@@ -22,13 +22,14 @@ struct PackingLimits {
 
 /// Gap of a certified sphere to the surface and to others, unit frame (docs/design.md 3.2).
 constexpr double kClearance = 1e-12;
-/// The same with what the square root and the sum round by: some 2⁻⁵³ of their size (≤ 4).
+/// The same plus the rounding of the square root and the sum: some 2⁻⁵³ of their size (≤ 4).
 constexpr double kGap = kClearance + 1e-14;
 
-/// Below this radius spheres stay certified, but the greedy promise ends (docs/design.md 4.2).
+/// Below this radius spheres are still certified, but the greedy guarantee ends (docs/design.md
+/// 4.2).
 constexpr float kFloatNoise = 1e-4f;
 
-/// The largest radius that a sphere about `centre` may have next to another one, before rounding.
+/// The largest radius of a sphere about `centre` next to another sphere, before rounding.
 IST_HD inline double gap_to_sphere(Float3 centre, const Sphere& s) {
   const double x = double{centre.x} - double{s.x};
   const double y = double{centre.y} - double{s.y};
@@ -36,8 +37,8 @@ IST_HD inline double gap_to_sphere(Float3 centre, const Sphere& s) {
   return std::sqrt(x * x + y * y + z * z) - double{s.r} - kGap;
 }
 
-/// The same next to the surface at the exact distance `clearance`, positive inside. To certify a
-/// candidate only distances below clearance_limit() of its radius matter.
+/// The same next to the surface at the exact distance `clearance`, positive inside. Certifying a
+/// candidate requires only distances below clearance_limit() of its radius.
 IST_HD inline double gap_to_surface(double clearance) { return clearance - kGap; }
 IST_HD inline double clearance_limit(float radius) { return 1.001 * double{radius}; }
 
@@ -49,14 +50,15 @@ IST_HD float certified_radius(const Team& team, Float3 centre, float radius, dou
                               const Spheres& spheres) {
   double r = double{radius} < gap ? double{radius} : gap;
   spheres.for_near(team, centre, [&](bool valid, std::uint32_t, const Sphere& s) {
-    const double room = gap_to_sphere(centre, s);
-    if (valid && room < r) r = room;
+    const double to_sphere = gap_to_sphere(centre, s);
+    if (valid && to_sphere < r) r = to_sphere;
   });
   return rounded_down(team.min(r));
 }
 
-/// Volumes are summed as integers, so that no order changes a sum. Their unit [unit-frame³] is a
-/// power of two that the solid's volume is 2^60 to 2^61 of: a needle's spheres count too.
+/// Volumes are summed as integers, so that sums do not depend on the order. Their unit
+/// [unit-frame³] is a power of two, 2^60 to 2^61 of which make the solid's volume: a needle's
+/// spheres count too.
 inline double volume_unit_of(double solid_volume) {
   int exponent = 0;
   std::frexp(solid_volume, &exponent);

@@ -59,7 +59,7 @@ void set_progress(Progress& progress, const PackingLimits& limits, std::size_t s
   progress.spheres = spheres;
   progress.coverage = coverage;
   progress.radius = radius * limits.length_unit;
-  // The first sphere meets a target of 0.
+  // The first sphere reaches a target of 0.
   double fraction = limits.target_coverage > 0
                         ? coverage / limits.target_coverage
                         : static_cast<double>(std::min<std::size_t>(spheres, 1));

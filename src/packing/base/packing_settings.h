@@ -13,8 +13,8 @@ void check_settings(const PackingSettings& settings);
 /// Error if the solid has no volume.
 PackingLimits packing_limits(const Solid& solid, double scale, const PackingSettings& settings);
 
-/// Sets where a packing stands; `radius`: of the spheres being inserted, unit frame. The fraction
-/// is that of the limit that is nearest, of count and coverage.
+/// Sets the progress of a packing; `radius`: of the spheres being inserted, unit frame. The
+/// fraction is that of the nearest limit, count or coverage.
 void set_progress(Progress& progress, const PackingLimits& limits, std::size_t spheres,
                   double coverage, double radius);
 

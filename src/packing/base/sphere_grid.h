@@ -7,19 +7,18 @@
 
 namespace ist::packing {
 
-/// The lists of a SphereGridLayout on the host. Blocks exist where a sphere's reach touches them.
-/// Reading is thread-safe between insertions.
+/// The lists of a SphereGridLayout on the host. Blocks exist within a sphere's reach. Reading is
+/// thread-safe between insertions.
 class SphereGrid {
  public:
   SphereGrid(const std::vector<Sphere>& spheres, const SphereGridLayout& layout);
 
   const SphereGridLayout& layout() const { return layout_; }
 
-  /// Lists sphere `index` = s.
   void insert(std::uint32_t index, const Sphere& s);
 
-  /// Calls visit(index) for the spheres that x's cell lists: all within reach of x, or the one that
-  /// covers the cell, and perhaps others.
+  /// Calls visit(index) for the spheres in the list of x's cell: all within reach of x, or the one
+  /// that covers the cell, and perhaps others.
   template <class Visit>
   void for_near(Float3 x, Visit&& visit) const {
     const int i = grid_coordinate(layout_, x.x), j = grid_coordinate(layout_, x.y),
@@ -57,7 +56,7 @@ class SphereGrid {
   std::vector<Chunk> chunks_;
 };
 
-/// The spheres as a PrototypeField sees them, on the host.
+/// The spheres in the form that a PrototypeField uses, on the host.
 class GridSpheres {
  public:
   GridSpheres(const std::vector<Sphere>& spheres, const SphereGrid& grid)
@@ -66,8 +65,8 @@ class GridSpheres {
   std::uint32_t count() const { return static_cast<std::uint32_t>(spheres_.size()); }
   float reach() const { return grid_.layout().reach; }
 
-  /// Calls visit(valid, index, sphere) for the spheres that x's cell lists. (Lanes of a wider team
-  /// would make the same number of calls, those without a sphere with valid = false.)
+  /// Calls visit(valid, index, sphere) for the spheres in the list of x's cell. (Lanes of a wider
+  /// team would make the same number of calls, those without a sphere with valid = false.)
   template <class Visit>
   void for_near(const SerialTeam&, Float3 x, Visit&& visit) const {
     grid_.for_near(x, [&](std::uint32_t i) { visit(true, i, spheres_[i]); });

@@ -6,11 +6,11 @@
 
 namespace ist::packing {
 
-/// Spheres by place: cubes of the unit frame, and what each of them lists. A sphere is listed where
-/// its surface is within `reach`, so what is no further than `reach` from a point stands in the one
-/// cell that contains the point. Cells come in blocks of 8³. A cell wholly inside a sphere lists
-/// that sphere alone (there is at most one: spheres do not overlap). What a cell lists is a set and
-/// a function of layout and spheres.
+/// A grid of spheres: cubes of the unit frame with lists. A sphere is listed where its surface is
+/// within `reach`, so the one cell that contains a point lists everything within `reach` of it.
+/// Cells come in blocks of 8³. A cell wholly inside a sphere lists that sphere alone (there is at
+/// most one: spheres do not overlap). The list of a cell is a set and a function of layout and
+/// spheres.
 struct SphereGridLayout {
   float reach = 2;     ///< > 0, unit frame
   float size = 0.25f;  ///< edge of a cell
@@ -24,7 +24,7 @@ struct SphereGridLayout {
   IST_HD std::uint32_t block_index(int i, int j, int k) const {
     return static_cast<std::uint32_t>((k * blocks_per_side + j) * blocks_per_side + i);
   }
-  /// Place of the grid's cell (i, j, k) in its block.
+  /// Index of the grid's cell (i, j, k) in its block.
   IST_HD static std::uint32_t cell_index(int i, int j, int k) {
     return static_cast<std::uint32_t>(((k & 7) * 8 + (j & 7)) * 8 + (i & 7));
   }
@@ -33,8 +33,8 @@ struct SphereGridLayout {
 constexpr float kGridHalfExtent = 1;
 constexpr int kMostBlocksPerSide = 128;
 
-/// Cells of about the reach, so that lists are short; but no more than the spheres are worth (a
-/// single large one would be listed in millions). `spheres`: how many there are when it is built.
+/// Cells of about the reach, so that lists are short, but no more cells than the spheres justify (a
+/// single large sphere would be listed in millions). `spheres`: their number at construction.
 IST_HD inline SphereGridLayout sphere_grid_layout(std::uint64_t spheres, float reach) {
   SphereGridLayout layout;
   layout.reach = reach;
@@ -58,7 +58,7 @@ IST_HD inline int grid_coordinate(const SphereGridLayout& layout, float x) {
   return i < 0 ? 0 : (i >= layout.cells_per_side ? layout.cells_per_side - 1 : i);
 }
 
-/// Cells that a sphere may be listed in, ends included.
+/// The cells that may list a sphere, ends included.
 struct GridRange {
   int lo[3], hi[3];
 };
@@ -76,11 +76,11 @@ IST_HD inline GridRange grid_range(const SphereGridLayout& layout, const Sphere&
            grid_coordinate(layout, s.z + outer)}};
 }
 
-/// How a sphere lies to a cell or a block.
+/// The relation of a sphere to a cell or a block.
 enum class GridRelation : std::uint8_t {
   away,    ///< not listed
-  near,    ///< listed, if nothing covers it
-  covers,  ///< alone
+  near,    ///< listed, unless another sphere covers it
+  covers,  ///< the only one listed
 };
 
 /// Nearest and farthest distance² along one axis from a centre to `width` cells from `cell` on.
@@ -113,8 +113,8 @@ IST_HD inline GridRelation block_relation(const SphereGridLayout& layout, const 
                        axis_span(layout, 8 * j, 8, s.y), axis_span(layout, 8 * k, 8, s.z));
 }
 
-/// Cell (i, j, k) of a block that the sphere is near. If it is away from the block or covers it, so
-/// it is for all of the block's cells.
+/// Cell (i, j, k) of a block that the sphere is near. If the sphere is away from the block or
+/// covers it, this is true for all of the block's cells.
 IST_HD inline GridRelation cell_relation(const SphereGridLayout& layout, const Sphere& s, int i,
                                          int j, int k) {
   return grid_relation(layout, s, axis_span(layout, i, 1, s.x), axis_span(layout, j, 1, s.y),

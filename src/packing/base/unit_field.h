@@ -14,7 +14,7 @@ struct UnitField {
     return solid.signed_distance(frame.from_unit(x)) / frame.scale();
   }
 
-  /// The surface point that the gradient at x leads to.
+  /// The surface point to which the gradient at x leads.
   Eigen::Vector3d foot(const Eigen::Vector3d& x, double value_of_x) const {
     constexpr double kStep = 0x1p-20;  // of central differences: float coordinates resolve it
     Eigen::Vector3d g;

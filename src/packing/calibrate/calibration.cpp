@@ -17,12 +17,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// A turned copy of the mesh costs memory and time: only for a shadow along x that is smaller than
-// this part of the largest, or than that part of the box.
+// A rotated copy of the mesh costs memory and time. It is made only for a shadow along x that is
+// smaller than this part of the largest shadow, or of the box.
 constexpr double kSmallShadow = 0.25;
 constexpr double kEmptyBox = 0.02;
 
-/// The surface's area, also as seen along each axis, and its moments.
+/// The surface's area, its projections along each axis, and its moments.
 struct SurfaceMoments {
   Vector3d shadow = Vector3d::Zero();  // a point counts as often as a line enters the surface there
   Vector3d first = Vector3d::Zero();
@@ -55,7 +55,7 @@ SurfaceMoments moments_of(const MeshView& mesh, std::uint32_t begin, std::uint32
 }
 
 SurfaceMoments surface_moments(const MeshView& mesh) {
-  // In parts of fixed size, added in their order: the same bits for any number of threads.
+  // Summed in parts of fixed size, in order: the same bits for any number of threads.
   constexpr std::uint32_t kPart = 1u << 13;
   std::vector<SurfaceMoments> parts((mesh.triangle_count + kPart - 1) / kPart);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
@@ -68,13 +68,13 @@ SurfaceMoments surface_moments(const MeshView& mesh) {
 }
 
 /// Rows: the eigenvectors of a symmetric matrix by rising eigenvalue, right-handed. Jacobi's method
-/// by + − × ÷ sqrt: the same bits everywhere.
+/// with + − × ÷ sqrt: the same bits everywhere.
 Matrix3d principal_axes(Matrix3d m) {
   Matrix3d axes = Matrix3d::Identity();
   for (int sweep = 0; sweep < 12; ++sweep)
     for (int k = 0; k < 3; ++k) {
       const int p = k, q = (k + 1) % 3;
-      // Turns nothing, and the square of theta may be no double.
+      // The rotation is negligible, and the square of theta may overflow.
       if (std::abs(m(p, q)) <= 1e-150 * std::abs(m(q, q) - m(p, p))) continue;
       const double theta = (m(q, q) - m(p, p)) / (2 * m(p, q));
       const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
@@ -95,10 +95,10 @@ Matrix3d principal_axes(Matrix3d m) {
   return sorted;
 }
 
-/// A solid seen so that lines along x meet it well. A thin plate is measured exactly by the lines
-/// that pierce it and badly by those that run along it, a needle by none if it lies at a slant in
-/// its box. So where few lines of the box along x meet the solid, it is turned: x is then the
-/// principal axis along which its surface extends least, z the one along which it extends most.
+/// A solid rotated so that lines along x intersect it well. A thin plate is measured exactly by
+/// lines that pierce it and badly by lines along it, a needle by none if it is slanted in its box.
+/// So if few lines of the box along x meet the solid, it is rotated: x is then the principal axis
+/// along which its surface extends least, z the one along which it extends most.
 class TurnedSolid {
  public:
   explicit TurnedSolid(const MeshSolid& solid) : original_(solid) {
@@ -136,15 +136,15 @@ class TurnedSolid {
 
  private:
   const MeshSolid& original_;
-  std::unique_ptr<MeshSolid> turned_;                   // null: the original serves
+  std::unique_ptr<MeshSolid> turned_;                   // null: the original is used
   Eigen::Matrix3d axes_ = Eigen::Matrix3d::Identity();  // rows
 };
 
 constexpr double kStep = 0.15;  // distance of columns over the mean leaf radius
-// Enough columns to measure the solid where spheres are few, and a bound where it is thin.
+// Enough columns to measure the solid with few spheres, and a bound if it is thin.
 constexpr double kMinColumns = 1u << 14;
 constexpr double kColumnsPerSphere = 64;
-// Radius of a sphere whose cell is empty, over the mean leaf radius: legal, and counts for nothing.
+// Radius of a sphere with an empty cell, over the mean leaf radius: valid, but negligible.
 constexpr double kEmptyCellRadius = 1e-4;
 
 /// Shares by the inner spheres' own volumes, for a solid that columns cannot measure.
@@ -159,12 +159,12 @@ std::vector<double> inflated_shares(std::span<const Sphere> inner) {
   return shares;
 }
 
-/// Calibrates prefixes of a packing; keeps the data of the solid that all of them use.
+/// Calibrates prefixes of a packing; keeps the solid's data that all of them use.
 class Calibrator {
  public:
   Calibrator(const MeshSolid& solid, SolidBackend& backend)
       : solid_(solid), turned_(solid), backend_(backend) {
-    // The cells are found in the frame of the turned solid.
+    // The cells are computed in the frame of the rotated solid.
     if (&turned_.solid() != &solid) turned_backend_ = backend.with(turned_.solid());
   }
 
@@ -213,7 +213,7 @@ class Calibrator {
   const MeshSolid& solid_;
   const TurnedSolid turned_;
   SolidBackend& backend_;
-  std::unique_ptr<SolidBackend> turned_backend_;  ///< null where the solid is not turned
+  std::unique_ptr<SolidBackend> turned_backend_;  ///< null if the solid is not rotated
 };
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace {
 constexpr double kMinColumnsAcross = 16;
 constexpr double kMaxBoxColumns = 1u << 22;
 
-/// Area of the solid's shadow along x, a point counted as often as a line enters the surface there.
+/// Area of the solid's projection along x, weighted by the number of entries into the surface.
 /// Summed in integers, so in any order.
 double shadow_area(const MeshView& mesh) {
   constexpr double kUnit = 0x1p-50;
@@ -31,7 +31,8 @@ double shadow_area(const MeshView& mesh) {
         return part;
       },
       [](std::uint64_t a, std::uint64_t b) { return a + b; });
-  return static_cast<double>(sum) * kUnit / 4;  // half the parallelograms, half the crossings enter
+  return static_cast<double>(sum) * kUnit /
+         4;  // half the parallelograms; half the crossings are entries
 }
 
 }  // namespace

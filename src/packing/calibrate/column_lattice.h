@@ -18,7 +18,7 @@ struct ColumnLattice : ColumnPlan {
   std::vector<ColumnSpan> spans;
   double length = 0;  ///< Σ of the spans' lengths, unit frame
 
-  double volume() const { return length * cross_section(); }  ///< unit frame³, as columns see it
+  double volume() const { return length * cross_section(); }  ///< unit frame³, by columns
   double y(std::uint32_t i, std::uint32_t j) const { return lines.y(i, j); }
   double z(std::uint32_t j) const { return lines.z(j); }
 };

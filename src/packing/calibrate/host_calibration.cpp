@@ -12,15 +12,15 @@
 namespace ist {
 namespace {
 
-constexpr std::size_t kParallelSites = 64;  // below, a cell is too small for several threads
+constexpr std::size_t kParallelSites = 64;  // smaller cells are not worth several threads
 constexpr double kMostSteps = 4096;         // along x
 
-/// Lists of sites one after another: each cell's follows its parent's.
+/// Lists of sites one after another: each cell's list follows its parent's.
 class SiteLists {
  public:
   std::size_t size() const { return size_; }
 
-  /// The list from `first` on. Calls of make_room() and append() move it.
+  /// The list from `first` on. Calls of reserve() and append() move it.
   SiteArrays list(std::size_t first) {
     return SiteArrays{coordinates_[0].data(), coordinates_[1].data(), coordinates_[2].data(),
                       weights_.data(), numbers_.data()}
@@ -28,19 +28,19 @@ class SiteLists {
   }
   double* powers() { return powers_.data(); }
 
-  void make_room(std::size_t count) {
-    const std::size_t room = size_ + count + kMostPowerLanes;
-    if (room <= numbers_.size()) return;
-    for (std::vector<double>& column : coordinates_) column.resize(2 * room);
-    weights_.resize(2 * room);
-    numbers_.resize(2 * room);
-    powers_.resize(2 * room);
+  void reserve(std::size_t count) {
+    const std::size_t needed = size_ + count + kMostPowerLanes;
+    if (needed <= numbers_.size()) return;
+    for (std::vector<double>& column : coordinates_) column.resize(2 * needed);
+    weights_.resize(2 * needed);
+    numbers_.resize(2 * needed);
+    powers_.resize(2 * needed);
   }
 
   void resize(std::size_t size) { size_ = size; }  ///< at most the capacity
 
   void append(const SiteArrays& sites, std::size_t count) {
-    make_room(count);
+    reserve(count);
     const SiteArrays to = list(size_);
     std::copy_n(sites.x, count, to.x);
     std::copy_n(sites.y, count, to.y);
@@ -56,7 +56,7 @@ class SiteLists {
   std::size_t size_ = 0;
 };
 
-/// Walks down the octree with the sites that each cell is left with.
+/// Descends the octree with the remaining sites of each cell.
 class CellIntegrator {
  public:
   CellIntegrator(const PowerGrid& grid, std::span<const PowerSite> sites)
@@ -64,7 +64,7 @@ class CellIntegrator {
 
   std::vector<PowerSums> run() {
     SiteLists lists;
-    lists.make_room(sites_.size());
+    lists.reserve(sites_.size());
     const SiteArrays all = lists.list(0);
     for (std::size_t k = 0; k < sites_.size(); ++k) {
       all.x[k] = sites_[k].x;
@@ -82,10 +82,10 @@ class CellIntegrator {
   }
 
  private:
-  /// `lists` ends with the parent's list, which starts at `first`; it comes back as it was.
+  /// `lists` ends with the parent's list, which starts at `first`; it is restored on return.
   void look_into(const PowerGridCell& cell, SiteLists& lists, std::size_t first) {
     const std::size_t end = lists.size();
-    lists.make_room(end - first);
+    lists.reserve(end - first);
     const std::size_t kept = keep_sites(PowerBox(grid_, cell), lists.list(first), end - first,
                                         lists.list(end), lists.powers());
     lists.resize(end + kept);
@@ -110,7 +110,7 @@ class CellIntegrator {
     lists.resize(end);
   }
 
-  /// A column that more sites share than a leaf has.
+  /// Handles a column with more sites than a leaf has.
   void walk_among_many(const PowerGridCell& cell, const std::uint32_t* list, std::uint32_t count) {
     std::vector<PowerSums>& sums = sums_.local();
     walk_column(grid_, PowerBlock(grid_, cell), sites_.data(), list, count, cell.i, cell.j,

@@ -7,7 +7,8 @@
 #include "packing/calibrate/column_lattice.h"
 #include "packing/calibrate/power_relaxation.h"
 
-// Calibration's heavy parts on the threads of the current arena; SolidBackend says what they do.
+// The expensive parts of a calibration on the threads of the current arena; SolidBackend documents
+// them.
 
 namespace ist {
 

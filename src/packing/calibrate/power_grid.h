@@ -17,9 +17,9 @@ IST_HD inline double power(const PowerSite& site, double x, double y, double z) 
 
 /// Cuts the segment [x0, x1] of the line (·, y, z) at the power cells of the listed sites and calls
 /// add(site, from, to) for each piece, from left to right. Exact: along a line all powers share the
-/// term x², so their lower envelope is one of straight lines, and its sites follow each other by
+/// term x², so their lower envelope consists of straight lines, and its sites follow each other by
 /// rising x. The order of the list does not matter: among sites with equal power the one that wins
-/// further on is taken, and of twins the one of smaller index.
+/// further on is taken, and among twins the one of smaller index.
 template <class Add>
 IST_HD void cut_by_power_cells(const PowerSite* sites, const std::uint32_t* list, std::uint32_t n,
                                double y, double z, double x0, double x1, Add&& add) {
@@ -43,7 +43,7 @@ IST_HD void cut_by_power_cells(const PowerSite* sites, const std::uint32_t* list
       const PowerSite& other = sites[list[k]];
       const double ahead = other.x - here.x;
       if (!(ahead > 0)) continue;
-      // Where the powers are equal; measured from x, so that digits are kept.
+      // The position where the powers are equal; measured from x to keep digits.
       const double t = x + (power(other, x, y, z) - here_power) / (2 * ahead);
       if (t > end || (t == end && (next == current || !ahead_of(list[k], next)))) continue;
       end = t;
@@ -75,13 +75,13 @@ IST_HD void for_spans(const Crossing* crossings, std::uint32_t count, Add&& add)
   }
 }
 
-/// Lengths are summed in integers of 2^−38: no order changes the sum, and 2^24 columns fit.
+/// Lengths are summed in integers of 2^−38: sums do not depend on the order, and 2^24 columns fit.
 constexpr double kLengthUnit = 0x1p-38;
 IST_HD inline std::uint64_t length_units(const ColumnSpan& span) {
   return static_cast<std::uint64_t>((span.x1 - span.x0) / kLengthUnit);
 }
 
-constexpr std::uint32_t kPowerLeafSites = 8;  ///< few enough to walk columns among all of them
+constexpr std::uint32_t kPowerLeafSites = 8;  ///< few enough to cut columns among all of them
 constexpr int kFlagLevel = 2;                 ///< finest level whose cells know if they are empty
 constexpr int kMostPowerLevels = 24;
 
@@ -121,7 +121,7 @@ IST_HD inline PowerGridCell child_of(const PowerGridCell& cell, std::uint32_t oc
           cell.level - 1};
 }
 
-/// Number of a cell's bit among those of its level.
+/// Index of a cell's bit among those of its level.
 IST_HD inline std::uint64_t flag_of(const PowerGrid& grid, const PowerGridCell& cell) {
   return (std::uint64_t{cell.j} * PowerGrid::cells(grid.columns.ny, cell.level) + cell.i) *
              PowerGrid::cells(grid.nx, cell.level) +
@@ -149,7 +149,7 @@ struct PowerBlock {
   IST_HD static std::uint32_t least(std::uint32_t a, std::uint32_t b) { return a < b ? a : b; }
 };
 
-/// Whether certainly no span meets the cell. Reads columns below the finest level with flags.
+/// True if certainly no span meets the cell. Reads columns below the finest level with flags.
 IST_HD inline bool is_empty(const PowerGrid& grid, const PowerGridCell& cell) {
   if (cell.s >= PowerGrid::cells(grid.nx, cell.level) ||
       cell.i >= PowerGrid::cells(grid.columns.ny, cell.level) ||
@@ -173,12 +173,12 @@ IST_HD inline bool is_empty(const PowerGrid& grid, const PowerGridCell& cell) {
 template <class Visit>
 IST_HD void for_flags(const PowerGrid& grid, const ColumnSpan& span, std::uint32_t i,
                       std::uint32_t j, Visit&& visit) {
-  constexpr double kRoom = 1e-6;  // steps, above the rounding of planes
+  constexpr double kMargin = 1e-6;  // steps; exceeds the rounding of planes
   const auto step = [&](double x) {
     return static_cast<std::uint32_t>(x > 0 ? (x < grid.nx ? x : grid.nx) : 0);
   };
-  const std::uint32_t first = step((span.x0 - grid.x0) / grid.step_x - kRoom);
-  const std::uint32_t last = step((span.x1 - grid.x0) / grid.step_x + kRoom) + 1;
+  const std::uint32_t first = step((span.x0 - grid.x0) / grid.step_x - kMargin);
+  const std::uint32_t last = step((span.x1 - grid.x0) / grid.step_x + kMargin) + 1;
   for (std::uint32_t s = first >> kFlagLevel; s << kFlagLevel < last; ++s)
     if (s < PowerGrid::cells(grid.nx, kFlagLevel))
       visit(flag_of(grid, {s, i >> kFlagLevel, j >> kFlagLevel, kFlagLevel}));
@@ -191,7 +191,7 @@ IST_HD void for_cells_of_row(const PowerGrid& grid, int level, std::uint32_t j, 
       visit(PowerGridCell{s, i, j, level});
 }
 
-/// Whether any child of a cell of level > kFlagLevel is flagged.
+/// True if any child of a cell of level > kFlagLevel is flagged.
 IST_HD inline bool any_child(const PowerGrid& grid, const PowerGridCell& cell) {
   for (std::uint32_t octant = 0; octant < 8; ++octant)
     if (!is_empty(grid, child_of(cell, octant))) return true;
@@ -213,8 +213,8 @@ struct PowerBox {
   }
 };
 
-/// The test which of a cell's sites may own a part of it: the others lose everywhere in it to the
-/// best site at its middle (differences of powers are affine). Host vectors: power_kernel.h.
+/// Tests which of a cell's sites may own a part of it: the others lose everywhere in it to the best
+/// site at its middle (differences of powers are affine). Host vectors: power_kernel.h.
 struct PowerFilter {
   PowerBox box;
   double least = 0;  ///< power of the best site at the middle
@@ -263,7 +263,7 @@ struct PowerSums {
   }
 };
 
-/// The terms of a piece in its site's sums.
+/// The terms that a piece adds to its site's sums.
 IST_HD inline PowerSums piece_sums(const PowerGrid& grid, double x0, double x1, double y,
                                    double z) {
   const double length = (x1 - x0) * grid.to_fixed;

@@ -16,7 +16,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Tag = hn::CappedTag<double, kMostPowerLanes>;
 using Vector = hn::Vec<Tag>;
 
-constexpr double kFar = 1e300;  ///< no power, no place along a line is beyond it
+constexpr double kFar = 1e300;  ///< exceeds every power, and every position along a line
 
 static_assert(kPowerLeafSites == kMostPowerLanes);
 
@@ -73,7 +73,7 @@ std::size_t keep_sites(const PowerBox& box, const SiteArrays& sites, std::size_t
   return size;
 }
 
-/// Up to kPowerLeafSites sites; lanes without one are far to the left and never win.
+/// Up to kPowerLeafSites sites; unused lanes are far to the left and never win.
 class CellWalk {
  public:
   CellWalk(const PowerGrid& grid, const SiteArrays& sites, std::size_t count)
@@ -115,7 +115,7 @@ class CellWalk {
   }
 
  private:
-  /// Powers of all at x; returns the least.
+  /// Computes the powers of all sites at x; returns the least.
   double measure(double x) {
     const Tag d;
     Vector least = hn::Set(d, kFar);
@@ -129,7 +129,7 @@ class CellWalk {
     return hn::GetLane(hn::MinOfLanes(d, least));
   }
 
-  /// Where the first site becomes as good as `current`; kFar if none does.
+  /// The position where the first site becomes as good as `current`; kFar if none does.
   double next_change(double x, std::size_t current) {
     const Tag d;
     const Vector here = hn::Set(d, powers_[current]), here_x = hn::Set(d, x_[current]);
@@ -137,9 +137,9 @@ class CellWalk {
     for (std::size_t k = 0; k < kMostPowerLanes; k += hn::Lanes(d)) {
       const Vector ahead = hn::Load(d, x_ + k) - here_x;
       const auto is_ahead = ahead > hn::Zero(d);
-      // Nothing is divided by zero, which traps where floating-point exceptions do.
+      // Avoids divisions by zero, which trap if floating-point exceptions do.
       const Vector twice = hn::IfThenElse(is_ahead, hn::Set(d, 2) * ahead, hn::Set(d, 1));
-      // Measured from x, so that digits are kept.
+      // Measured from x to keep digits.
       const Vector at = hn::Set(d, x) + (hn::Load(d, powers_ + k) - here) / twice;
       const Vector change = hn::IfThenElse(is_ahead, at, hn::Set(d, kFar));
       hn::Store(change, d, changes_ + k);
@@ -148,7 +148,7 @@ class CellWalk {
     return hn::GetLane(hn::MinOfLanes(d, first));
   }
 
-  /// Among the sites of this value the one furthest along x; among twins the first.
+  /// Among the sites with this value the one furthest along x; among twins the first.
   std::size_t foremost(const double* values, double value) const {
     const Tag d;
     std::uint32_t equal = 0;

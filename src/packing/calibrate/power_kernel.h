@@ -11,13 +11,13 @@ namespace ist {
 
 inline constexpr std::size_t kMostPowerLanes = 8;  ///< of a vector
 
-/// Sites in arrays that may be read, and written, kMostPowerLanes beyond their end.
+/// Sites in arrays that may be read, and written, kMostPowerLanes elements beyond their end.
 struct SiteArrays {
   double* x;
   double* y;
   double* z;
   double* weight;
-  std::uint32_t* number;  ///< of the site; rising
+  std::uint32_t* number;  ///< of the site; ascending
 
   SiteArrays from(std::size_t first) const {
     return {x + first, y + first, z + first, weight + first, number + first};
@@ -25,7 +25,7 @@ struct SiteArrays {
 };
 
 /// Copies those of `count` sites that may own a part of the cell to `kept`, which may directly
-/// follow them; returns how many. `powers`: count + kMostPowerLanes elements.
+/// follow them; returns their number. `powers`: count + kMostPowerLanes elements.
 std::size_t keep_sites(const PowerBox& box, const SiteArrays& sites, std::size_t count,
                        const SiteArrays& kept, double* powers);
 

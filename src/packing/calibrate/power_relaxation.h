@@ -12,18 +12,17 @@ namespace ist {
 
 constexpr int kRelaxations = 16;
 
-/// The octree over a solid's columns without its flags and pointers, which are the maker's.
+/// The octree over a solid's columns without its flags and pointers, which the caller sets.
 /// `length`: Σ of the columns' lengths.
 PowerGrid plan_power_grid(const ColumnPlan& plan, double length);
 
-/// Whether columns that see so much of a volume can share it out: a slanted sliver's cannot.
+/// True if columns that cover so much of a volume can divide it: those of a slanted sliver cannot.
 IST_HD inline bool columns_measure(double seen, double volume) {
   constexpr double kLargestMiss = 0.1;
   const double miss = seen > volume ? seen - volume : volume - seen;
   return seen > 0 && miss <= kLargestMiss * volume;
 }
 
-/// Radius of the ball of a volume.
 IST_HD inline double radius_of(double volume) {
   return cube_root(3 * volume / (4 * std::numbers::pi));
 }
@@ -33,8 +32,8 @@ IST_HD inline double share_of(const PowerSums& sums, std::int64_t total) {
   return sums.length > 0 ? static_cast<double>(sums.length) / static_cast<double>(total) : 0;
 }
 
-/// Moves a site to its cell's centre of mass and makes it the ball of the cell's volume. An empty
-/// cell's site keeps its place, and may win some back.
+/// Moves a site to its cell's centre of mass and gives it the cell's volume as a ball. The site of
+/// an empty cell stays, and may win some volume back.
 IST_HD inline void relax(PowerSite& site, const PowerSums& sums, std::int64_t total,
                          double volume) {
   const double share = share_of(sums, total);

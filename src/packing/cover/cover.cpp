@@ -18,7 +18,7 @@
 namespace ist {
 namespace {
 
-/// A mesh, as cover_cell() asks it.
+/// A mesh in the form that cover_cell() uses.
 class MeshCover {
  public:
   explicit MeshCover(const MeshSolid& solid) : solid_(solid), view_(solid.view()) {}
@@ -30,7 +30,7 @@ class MeshCover {
     return near.triangle != kNoTriangle;
   }
   bool inside(const double point[3]) const { return solid_.inside(Eigen::Vector3d(point)); }
-  /// Distance from the surface of a point inside, else 0.
+  /// Distance of an inside point from the surface; 0 for a point outside.
   double depth(const Eigen::Vector3d& point) const {
     return solid_.inside(point) ? solid_.closest_point(point).distance : 0;
   }
@@ -40,7 +40,7 @@ class MeshCover {
   const MeshView& view_;
 };
 
-/// A signed distance, as cover_cell() asks it.
+/// A signed distance in the form that cover_cell() uses.
 struct FieldCover : packing::UnitField {
   bool nearest(const double point[3], double radius, double q[3]) const {
     const Eigen::Vector3d x(point);
@@ -108,7 +108,7 @@ std::vector<double> cover(const Surface& surface, const CoverTask& task,
   tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t k) {
     CoverBall& ball = balls[k];
     const Eigen::Vector3d centre(ball.x, ball.y, ball.z);
-    // A ball up to the surface is part of the solid: it costs the separation bound nothing.
+    // A ball up to the surface is part of the solid: the separation bound loses nothing by it.
     ball.radius = std::max(ball.radius, surface.depth(centre)) + task.slack;
   });
   const auto count = static_cast<std::uint32_t>(balls.size());

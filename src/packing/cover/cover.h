@@ -21,7 +21,7 @@ std::vector<float> cover_radii(const MeshSolid& solid, SolidBackend& backend,
 std::vector<double> cover_on_host(const MeshSolid& solid, const CoverTask& task,
                                   const std::function<void(int)>& report);
 
-/// The same for a solid known by its signed distance alone, in the unit frame `frame`.
+/// The same for a solid with only a signed distance, in the unit frame `frame`.
 std::vector<double> cover_on_host(const Solid& solid, const UnitFrame& frame, const CoverTask& task,
                                   const std::function<void(int)>& report);
 

@@ -7,16 +7,16 @@
 #include "base/host_device.h"
 #include "packing/backend/tasks.h"
 
-// The subdivision that proves cover radii (cover.h), cell by cell, for host and device. It goes
-// level by level: what a level asks of the balls counts from the next level on, so that the result
+// The subdivision that proves cover radii (cover.h), cell by cell, for host and device. It proceeds
+// level by level: extensions that a level requests take effect at the next level, so the result
 // depends neither on the order of the cells nor on that of the lists.
 
 namespace ist {
 
-// Every ball starts this much larger than it need be, over the mean leaf radius: cells that it
-// contains then need not be divided down to the surface.
+// Every ball starts larger than necessary by this, over the mean leaf radius: then cells that it
+// contains need not be divided down to the surface.
 constexpr double kCoverSlack = 0.1;
-// A cell is small enough once its half-diagonal is this part of the extension that it asks for.
+// A cell is small enough if its half-diagonal is this part of the extension that it requests.
 constexpr double kCoverRefinement = 0.2;
 
 /// A cube that is not yet proven covered, and the balls that may be nearest somewhere in it.
@@ -24,15 +24,15 @@ struct CoverCell {
   double x = 0, y = 0, z = 0;  ///< centre, unit frame
   std::uint32_t first = 0;     ///< of its list
   std::uint32_t count = 0;     ///< balls listed
-  bool inside = false;         ///< known to lie wholly inside the solid
+  bool inside = false;         ///< known to be wholly inside the solid
 };
 
-/// One level's cells are alike but for their places.
+/// One level's cells differ only in their positions.
 struct CoverLevel {
   double half = 0;      ///< half edge, unit frame
   double smallest = 0;  ///< half-diagonal of a cell that is small enough
   const CoverBall* balls = nullptr;
-  const double* extension = nullptr;  ///< of every ball, as the levels before have it
+  const double* extension = nullptr;  ///< of every ball, after the levels before
 
   /// Half-diagonal, rounded up.
   IST_HD double reach() const { return 1.7320508075688774 * half + kDistanceMargin; }
@@ -51,7 +51,7 @@ IST_HD inline double farthest_from(const CoverBall& ball, double x, double y, do
   return std::sqrt(dx * dx + dy * dy + dz * dz);
 }
 
-/// A ball and how much larger than its radius it is asked to be.
+/// A ball and the extension of its radius that is requested.
 struct CoverDemand {
   double extension = 0;
   std::uint32_t ball = 0xFFFFFFFFu;
@@ -60,14 +60,14 @@ struct CoverDemand {
 };
 
 struct CoverVerdict {
-  bool divide = false;  ///< it has to be divided; `count` balls were kept
+  bool divide = false;  ///< it must be divided; `count` balls were kept
   std::uint32_t count = 0;
   bool inside = false;
   CoverDemand demand;
 };
 
-/// The listed ball that needs the least extension to reach as far as `measure(ball)` says, the
-/// smallest index among equals, and what it needs on top of what it has.
+/// The listed ball that needs the least extension to reach as far as `measure(ball)`, the smallest
+/// index among equals, and the extension that it still needs.
 struct CoverBest {
   double lacks = 0;
   std::uint32_t ball = 0;
@@ -90,10 +90,10 @@ IST_HD CoverBest best_ball(const Team& team, const CoverLevel& level, const std:
   return {all, team.min(least == all ? ball : 0xFFFFFFFFu)};
 }
 
-/// Examines one cell with its parent's list. `keep` (as long as the whole list) gets the balls that
-/// may be nearest somewhere in the cell's circumsphere. `surface` answers the team: nearest(point,
-/// radius, q): false only if the surface is certainly further away than `radius`, else q is about
-/// its closest point; inside(point): the winding number is ≥ 1.
+/// Examines one cell with its parent's list. `keep` (as long as the whole list) receives the balls
+/// that may be nearest somewhere in the cell's circumsphere. `surface` provides, for the team:
+/// nearest(point, radius, q), false only if the surface is certainly further away than `radius`,
+/// else q is about its closest point; inside(point): the winding number is ≥ 1.
 template <class Team, class Surface>
 IST_HD CoverVerdict cover_cell(const Team& team, const CoverLevel& level, const Surface& surface,
                                const CoverCell& cell, const std::uint32_t* list,
@@ -108,7 +108,7 @@ IST_HD CoverVerdict cover_cell(const Team& team, const CoverLevel& level, const 
   }
   nearest = team.min(nearest);
   int kept = 0;
-  double plain = 1e300;  // what the best ball lacks without any extension
+  double plain = 1e300;  // extension that the best ball would need without any so far
   for (int base = 0; base < count; base += Team::kWidth) {
     const int i = base + team.lane();
     bool stays = false;
@@ -136,7 +136,7 @@ IST_HD CoverVerdict cover_cell(const Team& team, const CoverLevel& level, const 
   const CoverBest whole = best_ball(team, level, keep, kept, farthest);
   if (whole.lacks + kDistanceMargin <= 0) return verdict;  // one ball contains the cell
 
-  // A point of the solid in the cell or beside it: its middle, or the surface's nearest.
+  // A point of the solid in or near the cell: its middle, or the surface's nearest.
   double point[3] = {cell.x, cell.y, cell.z};
   verdict.inside = cell.inside;
   if (!cell.inside) {
@@ -166,7 +166,7 @@ IST_HD CoverVerdict cover_cell(const Team& team, const CoverLevel& level, const 
   return verdict;
 }
 
-/// Child `octant` of a divided cell whose half edge is twice `half`; it takes over the list.
+/// Child `octant` of a divided cell whose half edge is twice `half`; it inherits the list.
 IST_HD inline CoverCell cover_child(const CoverCell& parent, int octant, double half) {
   CoverCell child = parent;
   child.x += (octant & 1) != 0 ? half : -half;

@@ -14,7 +14,7 @@ struct AscentSettings {
   GridLayout layout;  ///< of the prototype grid
   std::uint64_t seed = 0;
   std::uint32_t round = 0;
-  float smallest = 0;  ///< prototypes that cannot reach this radius give up
+  float smallest = 0;  ///< prototypes that cannot reach this radius are dropped
 };
 
 constexpr int kPlacements = 4;  ///< tries to place a prototype in a free part of its cell
@@ -22,10 +22,10 @@ constexpr int kAscentSteps = 48;
 constexpr float kFirstStep = 0.95f;  ///< ε(0)
 constexpr float kCooling = 0.9f;     ///< ε(t + 1) / ε(t)
 
-/// Directions to the features that a prototype is driven to and fro between.
+/// Directions to the features between which a prototype alternates.
 class Contacts {
  public:
-  /// Forgets what came before once steps were long; counts directions over 45° apart.
+  /// Drops old directions after a long step; counts directions over 45° apart.
   IST_HD void see(Float3 away) {
     if (seen_ < 1 || (dot(away, a_) < kApart)) {
       if (seen_ < 1) {
@@ -52,8 +52,8 @@ class Contacts {
 
 IST_HD inline float within(float x, float lo, float hi) { return x < lo ? lo : (x > hi ? hi : x); }
 
-/// Places a prototype at random in its cell and lets it flee from the closest point, in shrinking
-/// steps (paper, Algorithm 1), confined to the cell. Returns the best point that it saw.
+/// Places a prototype at random in its cell and moves it away from the closest point, in shrinking
+/// steps (paper, Algorithm 1), confined to the cell. Returns the best point found.
 template <class Team>
 IST_HD GridCandidate converged_prototype(const Team& team, const GridScene& scene,
                                          const AscentSettings& settings, std::uint32_t cell) {
@@ -101,17 +101,17 @@ IST_HD GridCandidate converged_prototype(const Team& team, const GridScene& scen
   return best;
 }
 
-/// A candidate that no larger one overlaps, and the radius it may keep, in double.
+/// A candidate that no larger one overlaps, and the radius that it may keep, in double.
 struct GridWinner {
   GridCandidate candidate;
-  double room = 0;
+  double radius = 0;
 };
 
-/// Called between pieces of a round's work; false: give up.
+/// Called between pieces of a round's work; false cancels it.
 using GoOn = std::function<bool()>;
 
 // The work of a grid packing's rounds is done by host threads (pack_grids.cpp) or a device
-// (cuda/packing/grids/device_rounds.h). Both give the same winners and offer the same calls:
+// (cuda/packing/grids/device_rounds.h). Both give the same winners and have the same functions:
 //
 //   build(layout)             the distance grid of that layout, with all spheres so far
 //   place_prototypes(layout)  the prototype grid of that layout
@@ -122,13 +122,13 @@ using GoOn = std::function<bool()>;
 //   update()                  lists, active cells and discrete distances after append()
 
 /// The radius that surface and spheres leave to a candidate, in double (docs/design.md 3.2); 0 if
-/// its centre is not in the solid. Other winners of its round are checked by overlap().
+/// its centre is not in the solid. overlap() checks the other winners of its round.
 template <class Team>
-IST_HD double certified_room(const Team& team, const GridScene& scene,
-                             const GridCandidate& candidate) {
+IST_HD double certified_clearance(const Team& team, const GridScene& scene,
+                                  const GridCandidate& candidate) {
   if (!inside_solid(team, scene, candidate.centre)) return 0;
   const double p[3] = {candidate.centre.x, candidate.centre.y, candidate.centre.z};
-  double room = candidate.radius;
+  double radius = candidate.radius;
   for_primitives_near(
       team, scene.grid, candidate.centre, [&] { return candidate.radius; },
       [&](std::uint32_t tag) {
@@ -141,10 +141,10 @@ IST_HD double certified_room(const Team& team, const GridScene& scene,
         } else {
           gap = gap_to_sphere(candidate.centre, scene.spheres[tag]);
         }
-        room = gap < room ? gap : room;
+        radius = gap < radius ? gap : radius;
       },
       [] {});
-  return team.min(room);
+  return team.min(radius);
 }
 
 }  // namespace ist::packing

@@ -4,14 +4,13 @@
 
 #include "packing/grids/distance_grid.h"
 
-// Which cells a primitive is listed in. Conservative: a cell within kListMargin of a primitive
-// lists it. The tests are the same on every machine, since which cells are active depends on them.
+// A cell within kListMargin of a primitive lists it.
+// The tests are the same on every machine, since they determine which cells are active.
 
 namespace ist::packing {
 
-/// A range of cells, inclusive.
 struct CellRange {
-  int lo[3], hi[3];
+  int lo[3], hi[3];  ///< inclusive
   IST_HD std::uint32_t count() const {
     return static_cast<std::uint32_t>(hi[0] - lo[0] + 1) *
            static_cast<std::uint32_t>(hi[1] - lo[1] + 1) *
@@ -20,7 +19,7 @@ struct CellRange {
 };
 
 IST_HD inline CellRange cells_between(const GridLayout& g, Float3 lower, Float3 upper) {
-  const float m = 2 * kListMargin;  // rounding of the coordinates aside
+  const float m = 2 * kListMargin;  // without the rounding of the coordinates
   return {{g.at_x(lower.x - m), g.at_y(lower.y - m), g.at_z(lower.z - m)},
           {g.at_x(upper.x + m), g.at_y(upper.y + m), g.at_z(upper.z + m)}};
 }
@@ -53,13 +52,13 @@ class TriangleCells {
 
   IST_HD const CellRange& range() const { return range_; }
 
-  /// Whether a triangle overlaps a cell in range().
+  /// True if a triangle overlaps a cell in range().
   IST_HD bool meets(const GridLayout& g, int i, int j, int k) const {
     const double margin = double{kListMargin};
     const double size = double{g.size} + 2 * margin;
     const double low[3] = {double{g.low_x(i)} - margin, double{g.low_y(j)} - margin,
                            double{g.low_z(k)} - margin};
-    // The corners of the cell that lie deepest behind the plane and farthest before it.
+    // The corners of the cell that are deepest behind the plane and furthest in front of it.
     double behind = 0, before = 0, scale = 0;
     for (int axis = 0; axis < 3; ++axis) {
       const double n = normal_[axis], from = low[axis] - p_[0][axis];
@@ -69,8 +68,8 @@ class TriangleCells {
     }
     const double rounding = 1e-14 * scale + 4 * rounding_;
     if (behind > rounding || before < -rounding) return false;
-    for (int axis = 0; axis < 3; ++axis) {                    // seen along this axis
-      if (!(std::fabs(normal_[axis]) > rounding_)) continue;  // an edge, as seen from here
+    for (int axis = 0; axis < 3; ++axis) {                    // projected along this axis
+      if (!(std::fabs(normal_[axis]) > rounding_)) continue;  // it projects to an edge
       const int u = (axis + 1) % 3, v = (axis + 2) % 3;
       const double turn = normal_[axis] > 0 ? 1 : -1;
       for (int edge = 0; edge < 3; ++edge) {
@@ -92,17 +91,17 @@ class TriangleCells {
   CellRange range_;
 };
 
-/// A covered cell lies so far inside its sphere that no triangle outside it can be listed there.
+/// A covered cell is so far inside its sphere that no triangle outside the sphere can be listed
+/// there.
 constexpr float kCoverMargin = 2e-5f;
 
-/// How a sphere and a cell lie to each other.
 enum class SphereCell { away, meets, covers };
 
 IST_HD inline CellRange sphere_range(const GridLayout& g, const Sphere& s) {
   return cells_between(g, {s.x - s.r, s.y - s.r, s.z - s.r}, {s.x + s.r, s.y + s.r, s.z + s.r});
 }
 
-/// A cell that the surface of the sphere meets lists it, one wholly inside is covered.
+/// A cell that the surface of the sphere meets lists it; a cell wholly inside is covered.
 IST_HD inline SphereCell sphere_cell(const GridLayout& g, const Sphere& s, int i, int j, int k) {
   const float from[3] = {g.low_x(i) - s.x, g.low_y(j) - s.y, g.low_z(k) - s.z};
   float near2 = 0, far2 = 0;
@@ -121,7 +120,7 @@ IST_HD inline SphereCell sphere_cell(const GridLayout& g, const Sphere& s, int i
 }
 
 /// Calls visit(cell id, covered) for every cell of the row (·, j, k) that the sphere meets or
-/// covers; the inside of the row only where `covered_too`.
+/// covers; the inside of the row only if `covered_too`.
 template <class Visit>
 IST_HD void for_sphere_row(const GridLayout& g, const Sphere& s, const CellRange& range, int j,
                            int k, bool covered_too, Visit&& visit) {

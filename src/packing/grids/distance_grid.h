@@ -10,13 +10,13 @@
 namespace ist::packing {
 
 // The discrete distance field (paper §3): Manhattan distances, in cells, to the closest cell with a
-// primitive. It is swept over a byte a cell, lines along x, then y, then z, to and fro, and then
-// written to the words of the active cells. Inactive cells stop a sweep: beyond them lie cells with
-// primitives that are closer.
+// primitive. Sweeps compute it in one byte a cell, along x, then y, then z, back and forth; then it
+// is written to the words of the active cells. Inactive cells stop a sweep: cells with primitives
+// beyond them are not closer.
 
-/// Nothing is decided closer than this to a cell's border, unit frame: it covers the rounding of
-/// float coordinates and of float distances (float_distance_error), so that what is listed and
-/// what is searched always covers what counts.
+/// No test decides closer than this to a cell's border, unit frame. It covers the rounding of float
+/// coordinates and of float distances (float_distance_error), so listed and searched cells always
+/// include the relevant ones.
 constexpr float kListMargin = 2e-6f;
 constexpr float kSearchMargin = 8e-6f;
 
@@ -26,7 +26,7 @@ struct GridLayout {
   float size = 1;          ///< edge of a cell, unit frame
   float inverse_size = 1;  ///< rounded
   int n[3] = {1, 1, 1};    ///< cells along x, y, z
-  int level = 0;           ///< how often it was split in 8
+  int level = 0;           ///< number of splits in 8
 
   IST_HD std::uint32_t count() const {
     return static_cast<std::uint32_t>(n[0]) * static_cast<std::uint32_t>(n[1]) *
@@ -89,7 +89,7 @@ struct CellRecord {
   std::int32_t winding = 0;  ///< with triangles: of the next cell without any towards −x
 };
 
-/// A triangle for the float distance formula, made in double and rounded once.
+/// A triangle for the float distance formula, computed in double and rounded once.
 struct alignas(64) GridTriangle {
   TriangleFrame<float> frame;
 };
@@ -109,11 +109,11 @@ IST_HD inline GridTriangle make_grid_triangle(const double* a, const double* b, 
   return t;
 }
 
-/// The paper's adaptive storage (§4.3), to be read by anyone: words for all cells of the grid lead
-/// to the records of the active ones, those that are neither outside nor covered by one sphere. A
-/// word contains the place of the record and the *discrete distance* (§3): how many cells away, in
-/// Manhattan distance, the closest cell with a primitive is, or less; 255 where it is more. Once
-/// few cells are active, the words stand in a hash table.
+/// The paper's adaptive storage (§4.3), read-only: words for all cells of the grid refer to the
+/// records of the active ones, those that are neither outside nor covered by one sphere. A word
+/// contains the index of the record and the *discrete distance* (§3): a lower bound, in cells, of
+/// the Manhattan distance to the closest cell with a primitive; 255 if it is more. If few cells are
+/// active, the words are in a hash table.
 struct DistanceGrid {
   static constexpr std::uint32_t kInactive = 0xFFFFFFFFu;
   static constexpr std::uint32_t kSlotMask = 0x00FFFFFFu;
@@ -121,7 +121,7 @@ struct DistanceGrid {
   static constexpr std::uint32_t kEmptyKey = 0xFFFFFFFFu;
 
   GridLayout layout;
-  const std::uint32_t* words = nullptr;  ///< by cell; or, hashed, by place in `keys`
+  const std::uint32_t* words = nullptr;  ///< by cell; or, hashed, by index in `keys`
   const std::uint32_t* keys = nullptr;   ///< nullptr: not hashed
   std::uint32_t key_mask = 0;
   const CellRecord* records = nullptr;
@@ -157,15 +157,14 @@ struct GridScene {
   const Sphere* spheres = nullptr;
 };
 
-constexpr std::uint8_t kFarCell = 254;  ///< so many cells away, or more
+constexpr std::uint8_t kFarCell = 254;  ///< this many cells away, or more
 constexpr std::uint8_t kInactiveCell = 255;
 
-/// Before the sweeps.
+/// The distance before the sweeps.
 IST_HD inline std::uint8_t start_distance(const CellRecord& record) {
   return record.triangle_count + record.sphere_count > 0 ? 0 : kFarCell;
 }
 
-/// Sweeps `count` cells from `first`, `stride` apart.
 IST_HD inline void sweep_distances(std::uint8_t* cells, std::int64_t first, std::int64_t stride,
                                    int count) {
   int reach = kFarCell;
@@ -182,7 +181,7 @@ IST_HD inline void sweep_distances(std::uint8_t* cells, std::int64_t first, std:
   }
 }
 
-/// A line of cells along `axis`: the n-th of them.
+/// A line of cells along `axis`, by number.
 struct GridLine {
   std::int64_t first, stride;
   int count;
@@ -202,14 +201,14 @@ IST_HD inline void sweep_line(std::uint8_t* cells, const GridLine& line) {
   sweep_distances(cells, line.first + (line.count - 1) * line.stride, -line.stride, line.count);
 }
 
-/// Places of a hash table for so many keys: a power of two, at most half full.
+/// Capacity of a hash table for so many keys: a power of two, at most half full.
 IST_HD inline std::uint64_t hash_size(std::uint64_t keys) {
   std::uint64_t size = 64;
   while (size < 2 * keys) size *= 2;
   return size;
 }
 
-/// Does a hash table, of 8 bytes a place, save much over 4 bytes a cell?
+/// True if a hash table, with 8 bytes an entry, is much smaller than 4 bytes a cell.
 IST_HD inline bool hash_pays(std::uint64_t cells, std::uint64_t active) {
   return 4 * hash_size(active) <= cells;
 }

@@ -19,18 +19,18 @@ IST_HD inline float uniform_part(std::uint64_t bits, int shift) {
   return static_cast<float>(static_cast<std::uint32_t>(bits >> shift) & 0x1FFFFFu) * 0x1p-21f;
 }
 
-/// A converged prototype: the best point that it saw in its cell. radius ≤ 0: none.
+/// A converged prototype: the best point found in its cell. radius ≤ 0: none.
 struct GridCandidate {
   Float3 centre;
   float radius = 0;
   std::uint64_t key = 0;      ///< radius bits, then a hash of the cell
   std::uint32_t cell = 0;     ///< of the prototype grid
-  std::int32_t contacts = 0;  ///< features that it came to lie between, as far as it could tell
+  std::int32_t contacts = 0;  ///< estimated number of features that it lies between
 };
 
 IST_HD inline std::uint64_t grid_key(float radius, std::uint64_t seed, std::uint32_t round,
                                      std::uint32_t cell) {
-  // Positive floats order like their bits.
+  // Positive floats are ordered like their bits.
   return std::uint64_t{bits_of(radius)} << 32 | random_bits(seed, round, cell, 0xFFFFu) >> 32;
 }
 
@@ -39,7 +39,7 @@ IST_HD inline bool goes_before(const GridCandidate& a, const GridCandidate& b) {
   return a.key != b.key ? a.key > b.key : a.cell < b.cell;
 }
 
-/// Do they overlap, or come closer than certified spheres may (certificate.h)?
+/// True if they overlap, or are closer than certified spheres may be (certificate.h).
 IST_HD inline bool overlap(const GridCandidate& a, const GridCandidate& b) {
   constexpr double kMoreThanGap = 4e-12;
   const double x = double{a.centre.x} - double{b.centre.x};

@@ -11,7 +11,7 @@
 namespace ist::packing {
 namespace {
 
-/// Adds, and returns what was there before.
+/// Adds, and returns the previous value.
 template <class T>
 T add(T& to, T value) {
   return std::atomic_ref<T>(to).fetch_add(value, std::memory_order_relaxed);
@@ -108,7 +108,8 @@ void HostGrid::update(const std::vector<Sphere>& spheres, std::size_t first_new)
   measure_distances();
 }
 
-/// Triangles that meet each cell, and their terms of the winding number along its row's centre.
+/// Counts the triangles that meet each cell, and their terms of the winding number along its row's
+/// centre line.
 void HostGrid::count_triangles(std::vector<std::uint32_t>& counts,
                                std::vector<std::int32_t>& crossings) const {
   const GridScene mesh = scene({});
@@ -128,7 +129,7 @@ void HostGrid::count_triangles(std::vector<std::uint32_t>& counts,
   });
 }
 
-/// Marks what is outside as inactive; turns crossings into windings for the records.
+/// Marks outside cells as inactive; turns crossings into windings for the records.
 void HostGrid::classify(const std::vector<std::uint32_t>& counts,
                         std::vector<std::int32_t>& windings) {
   words_.assign(cells(), 0);
@@ -149,7 +150,7 @@ void HostGrid::classify(const std::vector<std::uint32_t>& counts,
                  });
 }
 
-/// Cells wholly inside new spheres go inactive.
+/// Deactivates cells wholly inside new spheres.
 void HostGrid::cover(const std::vector<Sphere>& spheres, std::size_t first_new) {
   for_each_index(0, spheres.size() - first_new, 4, [&](std::size_t n) {
     const Sphere& s = spheres[first_new + n];
@@ -189,7 +190,7 @@ void HostGrid::fill_triangle_lists() {
   });
 }
 
-/// Records of inactive cells are given back once they are many; the rest move together.
+/// Frees the records of inactive cells once they are many, and compacts the rest.
 void HostGrid::drop_inactive() {
   const auto active = [this](const CellRecord& r) {
     return words_[place_of(r.cell)] != DistanceGrid::kInactive;
@@ -207,7 +208,7 @@ void HostGrid::drop_inactive() {
   hash_words();
 }
 
-/// A hash table replaces the words once it is much smaller (kHashBelow).
+/// Replaces the words by a hash table if that is much smaller (kHashBelow).
 void HostGrid::hash_words() {
   if (!hash_pays(layout_.count(), records_.size())) return;
   std::size_t size = hash_size(records_.size());

@@ -8,15 +8,16 @@
 
 namespace ist::packing {
 
-/// The distance grid in host memory, worked on by all threads of the arena.
+/// The distance grid in host memory, processed by all threads of the arena.
 class HostGrid {
  public:
-  /// Keeps `mesh`.
+  /// Keeps a reference to `mesh`.
   explicit HostGrid(const MeshView& mesh);
 
-  /// A new grid of that layout. Throws Error if more cells are active than a word can address.
+  /// Builds a new grid of that layout. Throws Error if more cells are active than a word can
+  /// address.
   void build(const GridLayout& layout, const std::vector<Sphere>& spheres);
-  /// Takes in spheres from `first_new` on: inactive cells, lists and discrete distances.
+  /// Adds spheres from `first_new` on: inactive cells, lists and discrete distances.
   void update(const std::vector<Sphere>& spheres, std::size_t first_new);
 
   /// Valid until the next change of the grid or of `spheres`.
@@ -37,7 +38,7 @@ class HostGrid {
   void hash_words();
   void list_spheres(const std::vector<Sphere>& spheres);
   void measure_distances();
-  std::uint32_t place_of(std::uint32_t cell) const;  ///< in words_; words_.size(): not there
+  std::uint32_t place_of(std::uint32_t cell) const;  ///< in words_; words_.size(): missing
 
   const MeshView mesh_;
   std::vector<GridTriangle> triangles_;

@@ -3,9 +3,9 @@
 #include "mesh/geometry/ray_crossing.h"
 #include "packing/grids/cell_listing.h"
 
-// Winding numbers from the distance grid alone, exact. They are constant in a cell that no triangle
-// meets, and a walk along x from such a cell to the point passes every triangle between them in
-// the cells of its row. Lines and their crossings as in mesh/hierarchy/winding.h.
+// Exact winding numbers from the distance grid alone. They are constant in a cell that no triangle
+// meets, and a walk along x from such a cell to the point passes every triangle between them in the
+// cells of its row. Lines and their crossings as in mesh/hierarchy/winding.h.
 
 namespace ist::packing {
 
@@ -19,8 +19,8 @@ IST_HD inline TriangleCells cells_of(const GridLayout& g, const Corners& t) {
   return TriangleCells(g, t.p[0], t.p[1], t.p[2]);
 }
 
-/// The first cell of the row (·, j, k) that lists the triangle: the one that a crossing in this row
-/// is counted in. kNoCell if none does.
+/// The first cell of the row (·, j, k) that lists the triangle, which counts its crossing in this
+/// row. kNoCell if none does.
 constexpr int kNoCell = -1;
 IST_HD inline int first_in_row(const GridLayout& g, const TriangleCells& cells, int j, int k) {
   for (int i = cells.range().lo[0]; i <= cells.range().hi[0]; ++i)
@@ -28,20 +28,20 @@ IST_HD inline int first_in_row(const GridLayout& g, const TriangleCells& cells, 
   return kNoCell;
 }
 
-/// The term of a triangle in the winding number along the centre line of a row, towards +x.
+/// A triangle's term of the winding number along the centre line of a row, towards +x.
 IST_HD inline int row_crossing(const GridLayout& g, const Corners& t, int j, int k) {
   const double yz[2] = {double{g.low_y(j)} + 0.5 * double{g.size},
                         double{g.low_z(k)} + 0.5 * double{g.size}};
   return -pierced(t, yz);
 }
 
-/// The term of a triangle in the winding number, on the line through p from −∞ to p.
+/// A triangle's term of the winding number, on the line through p from −∞ to p.
 IST_HD inline int winding_before(const Corners& t, const double p[3]) {
   const int facing = pierced(t, p + 1);
   return facing == 0 || lies_beyond(t, facing, p) ? 0 : -facing;
 }
 
-/// Is p in the solid (winding number ≥ 1)? p in the grid.
+/// True if p is in the solid (winding number ≥ 1). p must be in the grid.
 template <class Team>
 IST_HD bool inside_solid(const Team& team, const GridScene& scene, Float3 p) {
   const DistanceGrid& grid = scene.grid;

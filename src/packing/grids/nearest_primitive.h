@@ -5,9 +5,9 @@
 #include "base/team.h"
 #include "packing/grids/cell_listing.h"
 
-// The closest point on surface ∪ spheres through the distance grid (paper §3): a cell's discrete
-// distance says that the Manhattan ball of that radius around it contains no primitive, and how far
-// a row of cells may be skipped. The answer is the minimum of one float formula over all
+// The closest point on surface ∪ spheres through the distance grid (paper §3). A cell's discrete
+// distance shows that the Manhattan ball of that radius around it contains no primitive, and how
+// much of a row of cells may be skipped. The answer is the minimum of one float formula over all
 // primitives, then the smallest tag, whatever the grid and the order of the search.
 
 namespace ist::packing {
@@ -58,7 +58,7 @@ IST_HD inline Clearance clearance_from(const GridScene& scene, std::uint32_t tag
   return {distance, (distance > 0 ? 1 / distance : 0.0f) * away};
 }
 
-/// Visits what the lanes' cells list, all lists in one row of entries that the lanes share out.
+/// Visits the entries of the lanes' cells, all lists in one sequence that the lanes share.
 template <class Team, class Visit>
 IST_HD void visit_lists(const Team& team, const DistanceGrid& grid, const CellRecord& mine,
                         Visit&& visit) {
@@ -75,7 +75,7 @@ IST_HD void visit_lists(const Team& team, const DistanceGrid& grid, const CellRe
       const int other = team.broadcast(sum, lane >= d ? lane - d : lane);
       if (lane >= d) sum += other;
     }
-    const int before = sum - count;  // entries of the lanes before this one
+    const int before = sum - count;  // entries of previous lanes
     const int total = team.broadcast(sum, Team::kWidth - 1);
     for (int first = 0; first < total; first += Team::kWidth) {
       const int entry = first + lane;
@@ -93,8 +93,9 @@ IST_HD void visit_lists(const Team& team, const DistanceGrid& grid, const CellRe
   }
 }
 
-/// A *crew* is several teams at work on one search, each in its part of the rows; all its teams
-/// make the same calls otherwise. It has part(), parts(), and what nearest_primitive() uses below.
+/// A *crew* is several teams that work on one search, each on its part of the rows; otherwise all
+/// make the same calls. It has part(), parts(), and the functions that nearest_primitive() uses
+/// below.
 template <class Team>
 concept Crew = requires(const Team& team) {
   team.parts();
@@ -106,9 +107,9 @@ IST_HD bool takes_part(const Team& team, int group) {
   return true;
 }
 
-/// Visits the primitives of all cells that `bound` leaves within reach of p, in growing square
-/// rings of rows along x, a row a lane. `bound()` is the same in all lanes: the distance beyond
-/// which nothing counts. `visit(tag)` is called by single lanes; `settle()` by all, between visits.
+/// Visits the primitives of all cells within bound() of p, in growing square rings of rows along x,
+/// one row a lane. `bound()` is the same in all lanes: nothing further away counts. `visit(tag)` is
+/// called by single lanes; `settle()` by all, between visits.
 template <class Team, class Bound, class Visit, class Settle>
 IST_HD void for_primitives_near(const Team& team, const DistanceGrid& grid, Float3 p, Bound&& bound,
                                 Visit&& visit, Settle&& settle) {

@@ -17,7 +17,7 @@
 namespace ist::packing {
 namespace {
 
-/// Those of `candidates` that `keep(index)` is true for.
+/// The candidates for which `keep(index)` is true.
 template <class Keep>
 std::vector<GridCandidate> filtered(const std::vector<GridCandidate>& candidates,
                                     const Keep& keep) {
@@ -29,7 +29,7 @@ std::vector<GridCandidate> filtered(const std::vector<GridCandidate>& candidates
   return out;
 }
 
-/// Candidates by size class and place: class c contains radii in [2^(c−1), 2^c) · 2^−kClasses, in
+/// Candidates by size class and cell: class c contains radii in [2^(c−1), 2^c) · 2^−kClasses, in
 /// cells wide enough that a smaller candidate overlaps none beyond the neighbours of its own cell.
 class SizeClasses {
  public:
@@ -70,7 +70,7 @@ class SizeClasses {
                                         d) &
              0xFFFFF;
     };
-    // Classes below the least one's width would not fit 20 bits; their key only gets coarser lists.
+    // Classes narrower than the smallest would not fit 20 bits; their keys only get coarser lists.
     return mixed(along(p.x, dx) | along(p.y, dy) << 20 | along(p.z, dz) << 40) +
            static_cast<std::uint64_t>(c);
   }
@@ -80,9 +80,9 @@ class SizeClasses {
   std::array<bool, kClasses> used_{};
 };
 
-/// The paper's selection on the host's threads: of the candidates that no neighbouring cell's
-/// outdoes, those that no other of them goes before and overlaps. `candidates`: one a cell of
-/// `layout`; in no particular order.
+/// The paper's selection on the host's threads: among the candidates that no neighbouring cell's
+/// candidate outranks, those that no preceding one overlaps. `candidates`: one a cell of `layout`,
+/// in any order.
 std::vector<GridCandidate> selected(const GridLayout& layout,
                                     const std::vector<GridCandidate>& candidates) {
   const std::size_t size = hash_size(candidates.size());
@@ -102,10 +102,10 @@ std::vector<GridCandidate> selected(const GridLayout& layout,
   return filtered(ahead, [&](std::size_t i) { return !classes.outdone(i); });
 }
 
-/// The rounds of a grid packing on the threads of the current arena (ascent.h says which).
+/// The rounds of a grid packing on the threads of the current arena (see ascent.h).
 class HostRounds {
  public:
-  /// Keeps `mesh`.
+  /// Keeps a reference to `mesh`.
   explicit HostRounds(const MeshView& mesh) : grid_(mesh) {}
 
   void build(const GridLayout& layout) {
@@ -145,7 +145,7 @@ class HostRounds {
     cells_.resize(kept);
     cells_.shrink_to_fit();
     std::vector<GridCandidate> candidates(kept);
-    constexpr std::size_t kChunk = 4096;  // prototypes between two looks at clock and progress
+    constexpr std::size_t kChunk = 4096;  // prototypes between two checks of clock and progress
     for (std::size_t from = 0; from < kept; from += kChunk) {
       for_each_index(from, std::min(kept, from + kChunk), 8, [&](std::size_t i) {
         candidates[i] = converged_prototype(SerialTeam{}, scene, settings, cells_[i]);
@@ -160,7 +160,7 @@ class HostRounds {
     const GridScene scene = grid_.scene(spheres_);
     std::vector<GridWinner> certified(winners.size());
     for_each_index(0, winners.size(), 8, [&](std::size_t i) {
-      certified[i] = {winners[i], certified_room(SerialTeam{}, scene, winners[i])};
+      certified[i] = {winners[i], certified_clearance(SerialTeam{}, scene, winners[i])};
     });
     return certified;
   }
@@ -177,9 +177,9 @@ class HostRounds {
  private:
   HostGrid grid_;
   std::vector<Sphere> spheres_;
-  std::size_t listed_ = 0;  ///< spheres that the grid knows
+  std::size_t listed_ = 0;  ///< spheres that are in the grid
   GridLayout prototypes_;
-  std::vector<std::uint32_t> cells_;  ///< of the prototype grid, active as of the last round
+  std::vector<std::uint32_t> cells_;  ///< active cells of the prototype grid after the last round
 };
 
 /// Words and records of a grid under construction, with a third of its cells active.
@@ -188,7 +188,7 @@ constexpr double kBytesPerCell = 24;
 double cell_count(const GridLayout& g) { return double(g.n[0]) * double(g.n[1]) * double(g.n[2]); }
 
 /// Cells on the longest side such that a compact solid fills some kFirstPrototypes of them: the
-/// paper's 4–9, by how much of its box the solid fills.
+/// paper's 4–9, depending on how much of its box the solid fills.
 int automatic_start(const GridFigures& solid) {
   constexpr double kFirstPrototypes = 64;
   double longest = 0;
@@ -298,7 +298,7 @@ GridSchedule grid_schedule(GridMode mode, const GridSettings& settings, const Gr
   const int refinements = settings.refinements >= 0 ? settings.refinements : kRefinements;
   const int asked = resolution > 0 ? levels_to(start, resolution) : -1;
   require_size(start, std::max(refinements, asked));
-  int levels = 0;  // that there can be
+  int levels = 0;  // the maximum
   while ((start << (levels + 1)) <= kMostGridCells) ++levels;
   s.first = make_grid_layout(solid.lower, solid.upper, start, levels);
   s.finest_prototypes = refinements;
@@ -330,7 +330,7 @@ GridLayout make_grid_layout(const double lower[3], const double upper[3], int st
   const double margin = 2 * double{kSearchMargin};
   double longest = 0;
   for (int k = 0; k < 3; ++k) longest = std::max(longest, upper[k] - lower[k] + 4 * margin);
-  // Edges of 8 significant bits and an origin that is a multiple of their last bit at the finest
+  // Edges with 8 significant bits and an origin that is a multiple of their last bit at the finest
   // level: 24 bits then represent every border exactly.
   int exponent = 0;
   std::frexp(longest / start, &exponent);

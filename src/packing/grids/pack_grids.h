@@ -17,12 +17,13 @@ struct GridFigures {
   double lower[3] = {}, upper[3] = {};  ///< bounds of the solid, unit frame
   double volume = 0;                    ///< unit frame³
   std::size_t triangles = 0;
-  std::size_t memory = 0;  ///< bytes that the grids may take
+  std::size_t memory = 0;  ///< [bytes] that the grids may take
 };
 
 /// The two grids of a mode over the rounds (docs/design.md 4.1): levels of one first grid's
-/// refinements. The prototype grid's alone decide what is packed, so they depend on mesh and
-/// settings only; the distance grid's decide how fast, and also on the memory that is free.
+/// refinements. The prototype grid's levels determine the packing, so they depend on mesh and
+/// settings only; the distance grid's levels affect only the speed, and also depend on the free
+/// memory.
 struct GridSchedule {
   GridLayout first;           ///< level 0
   int prototypes = 0;         ///< level of the prototype grid at the start
@@ -38,20 +39,21 @@ struct GridSchedule {
   }
 };
 
-/// Cells on the longest side of a distance grid that suits so many triangles: finer ones are
+/// Cells on the longest side of a distance grid that suits so many triangles; finer ones are
 /// slower.
 int distance_resolution(const GridFigures& solid);
 
-/// Throws Error if settings ask for more cells than there can be.
+/// Throws Error if settings require more cells than possible.
 GridSchedule grid_schedule(GridMode mode, const GridSettings& settings, const GridFigures& solid);
 
-// Float distances to a grid's lists are good to a few 2^-23: nothing below this is told apart. The
-// banded mode certifies as it goes, and goes down to a quarter of it.
+// Float distances to a grid's lists are accurate to a few 2^-23: smaller radii cannot be resolved.
+// The banded mode certifies as it proceeds, and goes down to a quarter of it.
 constexpr float kSmallestGridRadius = 0x1p-21f;
-constexpr int kIdleRounds = 3;  ///< without a sphere at the finest grids: nothing fits any more
+constexpr int kIdleRounds =
+    3;  ///< without a sphere at the finest grids: then no further sphere fits
 
 /// The paper's algorithm (§3, §4; docs/design.md 4.1), the same for all four schedules, on the host
-/// or a device: `Rounds` as ascent.h says.
+/// or a device: `Rounds` as in ascent.h.
 template <class Rounds>
 class GridPacker {
  public:
@@ -90,7 +92,7 @@ class GridPacker {
   }
 
  private:
-  /// Inserts what one set of prototypes finds; false if that is nothing.
+  /// Inserts the winners of one set of prototypes; false if there are none.
   bool round() {
     const float smallest = std::max(kSmallestGridRadius, rounded_up(limits_.min_radius));
     std::vector<GridWinner> winners = rounds_.round(
@@ -102,7 +104,7 @@ class GridPacker {
     });
     std::vector<Sphere> inserted;
     for (const GridWinner& w : winners) {
-      const float r = rounded_down(w.room);
+      const float r = rounded_down(w.radius);
       if (!(r >= smallest)) continue;
       if (r < kFloatNoise) result_.below_float_noise = true;
       inserted.push_back({w.candidate.centre.x, w.candidate.centre.y, w.candidate.centre.z, r});
@@ -120,7 +122,7 @@ class GridPacker {
     return !inserted.empty();
   }
 
-  /// Splits the prototype grid; the distance grid follows where it would be the coarser one.
+  /// Splits the prototype grid; refines the distance grid if it would be the coarser one.
   void refine() {
     prototypes_ = refined(prototypes_);
     if (distances_ < std::min(schedule_.finest_distances, prototypes_.level)) {
@@ -141,7 +143,7 @@ class GridPacker {
     reason_ = reason;
   }
 
-  /// Looks at the clock, and asks the user's callback ten times a second.
+  /// Checks the time limit, and calls the user's callback ten times a second.
   bool goes_on() {
     if (stopped_) return false;
     const auto why = stage_.stop([this](Progress& now) {

@@ -5,8 +5,8 @@
 
 namespace ist::packing {
 
-/// Does a cell of the prototype grid contain anything that is neither outside nor covered, as far
-/// as the distance grid tells? Both grids refine the same first one.
+/// True if a cell of the prototype grid may contain anything that is neither outside nor covered,
+/// by the distance grid. Both grids refine the same first one.
 template <class Team>
 IST_HD bool prototype_cell_active(const Team& team, const GridScene& scene,
                                   const GridLayout& prototypes, std::uint32_t cell) {
@@ -53,8 +53,9 @@ struct CellTable {
   }
 };
 
-/// The first cut of the selection: does the prototype of a neighbouring cell go before this one and
-/// overlap it? Most do not survive it, since their cells contain no Voronoi node (paper, Figure 2).
+/// The first step of the selection: true if the prototype of a neighbouring cell precedes this one
+/// and overlaps it. Most prototypes are eliminated, since their cells contain no Voronoi node
+/// (paper, Figure 2).
 IST_HD inline bool outdone_by_neighbour(const GridLayout& g, const CellTable& table,
                                         const GridCandidate* candidates, std::uint32_t index) {
   const GridCandidate me = candidates[index];

@@ -1,4 +1,4 @@
-// Answers as objects, and the bytes that they stand for.
+// Conversion of answers between objects and bytes.
 
 import {copy3} from './desk.js';
 import {f64, u32} from './memory.js';
@@ -13,13 +13,13 @@ export const statusOf = (status) => status === 0 ? 'ok' :
     status === kMissingData                      ? 'missing-data' :
                                                    'invalid-input';
 
-/** Of an answer, which is one. */
+/** The status code of a valid answer. */
 export const codeOf = (status) => status === 'budget-exhausted' ? 1 :
     status === 'error-exceeded'                                 ? kErrorExceeded :
                                                                   0;
 
-// Vectors of answers: after how many numbers each begins.
-// Other numbers are named one by one: through such a table each would make garbage.
+// Offsets of the vectors in answers, in numbers.
+// Scalars are read one by one: a table of them would create garbage.
 const kPenetration = {centroid: 3, force: 6, torque: 9, contactNormal: 13};
 const kPatch = {centroid: 1, normal: 4, force: 10, torque: 13, point: 16};
 const kGap = {pointA: 3, pointB: 6, normal: 9};
@@ -72,7 +72,7 @@ export function readPenetration(place, status, out) {
   return readVectors(kPenetration, at, out);
 }
 
-/** Puts an answer back where the library looks for it. */
+/** Writes an answer to where the library reads it. */
 export function writePenetration(place, answer) {
   const numbers = f64(), integers = u32(), at = place / 8 + 1;
   integers[2 * at - 1] = codeOf(answer.status);
@@ -86,7 +86,7 @@ export function writePenetration(place, answer) {
   writeVectors(kPenetration, at, answer);
 }
 
-/** Of a separation and of an impact: the gap, and where it is. */
+/** The common members of a separation and an impact: the gap, and where it is. */
 export const newGap = () => ({distanceMin: 0, distanceMax: 0, ...newVectors(kGap), nodeVisits: 0});
 
 /** `at`: doubles from the start of memory to the number before the gap. */
@@ -104,7 +104,7 @@ export const kPatchBytes = 160;
 
 export function readPatch(place, patch) {
   const numbers = f64(), integers = u32(), at = place / 8;
-  // Exact below 2⁵³, which is what assets that fit into 32 bits of addresses stay under.
+  // Exact below 2⁵³, which ids of assets in a 32-bit address space do not reach.
   patch.id = integers[2 * at] + 2 ** 32 * integers[2 * at + 1];
   patch.area = numbers[at + 7];
   patch.depth = numbers[at + 8];

@@ -1,4 +1,4 @@
-// Assets and shapes: what lies in WebAssembly's memory and is given back.
+// Assets and shapes: objects in WebAssembly's memory, which is released.
 
 import {kMissingData} from './answers.js';
 import {count, desk, notNegative, positive, sphereMeasureOf, writeNumbers} from './desk.js';
@@ -6,10 +6,10 @@ import {IstError} from './error.js';
 import {check, f64, functions, give, take, u32, u8, withRoom} from './memory.js';
 import {checkOptions} from './options.js';
 
-/** Gives back what nobody refers to any more. */
+/** Releases memory without references. */
 const forgotten = new FinalizationRegistry((places) => places.forEach(give));
 
-/** What owns memory: a list of places. */
+/** An owner of memory: a list of addresses. */
 class Owner {
   constructor(places, key) {
     if (key !== kInside)
@@ -34,7 +34,7 @@ function vector(at) {
   return f64().slice(at, at + 3);
 }
 
-/** Bytes of whatever holds bytes. */
+/** The bytes of an ArrayBuffer or a view. */
 function bytesOf(given) {
   if (ArrayBuffer.isView(given))
     return new Uint8Array(given.buffer, given.byteOffset, given.byteLength);
@@ -85,7 +85,7 @@ export class Asset extends Owner {
     const integers = u32(), at = desk().info / 4, values = at / 2 + 2;
     const details = [];
     const spheres = integers[at + 2] + 2 ** 32 * integers[at + 3];
-    // A mesh alone has no levels of spheres.
+    // A mesh-only asset has no levels of spheres.
     for (let i = 0; spheres > 0 && i < integers[at + 1]; ++i)
       details.push(this._count({detail: i}, 0));
     return {
@@ -122,7 +122,7 @@ export class Asset extends Owner {
     };
   }
 
-  /** Writes the first `capacity` balls to `room`, and says how many there are. */
+  /** Writes the first `capacity` balls to `room`; returns the number of all. */
   _balls(set, level, room, capacity) {
     checkOptions('Asset.spheres()', set);
     const detail = count(set?.detail, 0, 'detail');
@@ -181,7 +181,7 @@ export class Asset extends Owner {
 const kHalfSpace = 1, kBox = 2, kBall = 3, kCapsule = 4, kCylinder = 5, kHeights = 6,
       kDistanceGrid = 7;
 
-/** A shape of up to eight numbers, and of `data`, whose memory it owns. */
+/** A shape with up to eight numbers, and `data`, whose memory it owns. */
 function made(kind, numbers, data = 0, columns = 0, rows = 0, layers = 0) {
   const owned = data === 0 ? [] : [data];
   try {
@@ -202,7 +202,7 @@ function three(given, what) {
   return [given[0], given[1], given[2]];
 }
 
-/** A copy of as many floats as a grid has points. */
+/** A copy of one float per point of a grid. */
 function copied(given, points, what) {
   for (const along of points)
     if (!(Number.isInteger(along) && along >= 2))
@@ -251,7 +251,7 @@ export class Shape extends Owner {
       highest = Math.max(highest, h);
     }
     if (!(highest - lowest < Infinity)) throw new IstError('ist: a height is no finite number');
-    // Both 0 is what says that nothing is known, which of a level ground at 0 is true enough.
+    // Both 0 means unknown, which is also valid for level ground at 0.
     return made(kHeights, [spacing[0], spacing[1], lowest, highest], data, columns, rows);
   }
 
@@ -265,7 +265,7 @@ export class Shape extends Owner {
     return made(kDistanceGrid, [...origin, spacing, options?.error ?? 0], data, ...along);
   }
 
-  /** Its place in WebAssembly. */
+  /** Its address in WebAssembly. */
   get _at() {
     if (this._places === null) throw new IstError('ist: a shape was used after free()');
     return this._places[0];

@@ -10,7 +10,7 @@ import {maxPatchesOf, solid} from './query.js';
 const kPairBytes = 136;  // asked_pair_t
 const room = new Room();
 
-/** Writes what is asked to `place`. */
+/** Writes the pairs of a batch to `place`. */
 function writePairs(place, pairs, who) {
   let i = 0;
   try {
@@ -28,7 +28,7 @@ function writePairs(place, pairs, who) {
   }
 }
 
-/** An answer's status stands in its second word. */
+/** The status is an answer's second word. */
 const statusAt = (place) => u32()[place / 4 + 1] | 0;
 
 export function penetrationBatch(pairs, options) {

@@ -1,4 +1,4 @@
-// What is told from answers that are there already, and of two assets at any pose.
+// Functions of existing answers, and of two assets whatever their pose.
 
 import {codeOf, kPatchBytes, kWrench, newPenetration, newVectors, readPatches, readPenetration, readVectors, writePatch, writePenetration} from './answers.js';
 import {Asset} from './asset.js';

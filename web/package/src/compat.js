@@ -1,4 +1,4 @@
-// For wherever a file beside the module gets lost: the WebAssembly is in the module.
+// For environments that lose a file beside the module: the WebAssembly is in the module.
 
 import {inlined} from '../dist/inlined.js';
 

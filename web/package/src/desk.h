@@ -1,4 +1,4 @@
-/* The desk: numbers of questions and answers lie on it, where places() says. */
+/* The desk: memory for the arguments and answers of queries, at the addresses from places(). */
 #pragma once
 
 #include <ist/c.h>
@@ -7,10 +7,10 @@
 
 #define EXPORT(name) __attribute__((export_name(#name)))
 
-/* As many as a contact law remembers, and a GPU finds. */
+/* The maximum of a contact law's memory and of a GPU. */
 enum { kMostPatches = sizeof((ist_contact_memory_t*)0)->patches / sizeof(ist_patch_memory_t) };
 
-/* w, x, y, z; x, y, z; scale, where 0 is taken for 1 */
+/* w, x, y, z; x, y, z; scale, where 0 means 1 */
 typedef struct place {
   ist_pose_t pose;
   double scale;
@@ -18,7 +18,7 @@ typedef struct place {
 
 typedef struct desk {
   place_t a, b;
-  /* For separation too, which has fewer. */
+  /* Used for separation too, which has fewer members. */
   ist_penetration_settings_t settings;
   ist_penetration_t penetration;
   ist_separation_t separation;
@@ -32,7 +32,7 @@ typedef struct desk {
   ist_impact_t impact;
   ist_size_match_t fit;
   ist_wrenches_t wrenches;
-  double numbers[8]; /* of whatever is asked */
+  double numbers[8]; /* of any query */
   ist_workspace_t workspace;
 } desk_t;
 extern desk_t desk;
@@ -44,7 +44,7 @@ _Static_assert(sizeof(ist_ball_t) == 32, "ball");
 _Static_assert(sizeof(ist_lens_t) == 72, "lens");
 _Static_assert(sizeof(ist_outline_segment_t) == 56, "segment");
 
-/* Where an asset lies, or a shape, plus 1. */
+/* The address of an asset, or that of a shape plus 1. */
 typedef uintptr_t solid_t;
 
 static inline ist_placed_t placed(solid_t solid, const place_t* place) {

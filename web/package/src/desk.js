@@ -1,4 +1,4 @@
-// The desk of src/exports.c: where questions are put and answers lie.
+// The desk of src/exports.c: the memory for arguments and answers.
 
 import {IstError} from './error.js';
 import {f64, functions, u32} from './memory.js';
@@ -11,7 +11,7 @@ const kParts = [
   'impact', 'fit', 'wrenches', 'motionA', 'motionB', 'patches', 'counts', 'numbers'
 ];
 let parts = null;
-/** Where each part of the desk lies: bytes from the start of memory. */
+/** The address of each part of the desk: bytes from the start of memory. */
 export function desk() {
   if (parts === null) {
     const at = (functions('a query').places() >>> 0) / 4;
@@ -20,7 +20,7 @@ export function desk() {
   return parts;
 }
 
-// Words are put together only where something is wrong: a loop shall make no garbage.
+// Names are concatenated only for errors, so that a loop creates no garbage.
 
 const named = (what, part) => part === undefined ? what : `${what}.${part}`;
 
@@ -30,7 +30,7 @@ function number(value, what, part) {
   return value;
 }
 
-/** Writes `count` numbers, or those of `absent` where none are given. */
+/** Writes `count` numbers, or `absent` if none are given. */
 export function writeNumbers(out, at, given, absent, count, what, part) {
   if (given === undefined || given === null) given = absent;
   if (given.length !== count)
@@ -38,7 +38,7 @@ export function writeNumbers(out, at, given, absent, count, what, part) {
   for (let i = 0; i < count; ++i) out[at + i] = number(given[i], what, part);
 }
 
-/** Throws a TypeError for a member of `given` that is none of `members`: it is misspelt. */
+/** Throws a TypeError for a member of `given` that is not in `members`: it is misspelt. */
 export function checkMembers(given, members, what) {
   if (given === undefined || given === null) return;
   if (typeof given !== 'object') throw new TypeError(`ist: ${what} is ${given}, not an object`);
@@ -51,14 +51,14 @@ export const kPose = ['rotation', 'translation', 'scale'];
 const kIdentity = [1, 0, 0, 0];
 const kOrigin = [0, 0, 0];
 
-/** Writes place A (0) or B (1). */
+/** Writes pose A (0) or B (1). */
 export function writePose(which, pose, what) {
   if (which === 1 && (pose === undefined || pose === null))
     throw new IstError(`ist: ${what} is missing: {rotation, translation, scale}`);
   writePoseAt(which === 0 ? desk().a : desk().b, pose, what);
 }
 
-/** The same anywhere in memory. */
+/** The same at any address. */
 export function writePoseAt(place, pose, what) {
   checkMembers(pose, kPose, what);
   const out = f64(), at = place / 8;
@@ -100,12 +100,12 @@ export function notNegative(value, what) {
   return value;
 }
 
-/** Of what has spheres to show. */
+/** For functions that return spheres. */
 export function sphereMeasureOf(value) {
   return choice(value, kSphereMeasures, 'measure');
 }
 
-/** Writes every setting that options have. */
+/** Writes all settings in the options. */
 export function writeSettings(options) {
   const integers = u32();
   const at = desk().settings / 4;

@@ -1,4 +1,4 @@
-/* The C functions as a page's JavaScript calls them: assets, shapes, and what is asked of two. */
+/* The C functions for JavaScript: assets, shapes, and queries of two. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +17,7 @@ desk_t desk = {
     .wrenches = {.size = sizeof desk.wrenches},
 };
 
-/* Where the parts of the desk lie, in the order of src/desk.js. */
+/* The addresses of the desk's parts, in the order of src/desk.js. */
 EXPORT(places) const void* const* places(void) {
   static const void* const all[] = {
       &desk.a,     &desk.b,        &desk.settings, &desk.penetration,     &desk.separation,
@@ -41,7 +41,7 @@ EXPORT(version) uint32_t version(void) { return ist_version(); }
 
 /* --- Trees and shapes ------------------------------------------------------------------------- */
 
-/* `block`: a handle, and on the next 64-byte boundary an asset of `size` bytes. */
+/* `block`: a handle, followed at the next 64-byte boundary by an asset of `size` bytes. */
 EXPORT(tree) ist_status_t tree(void* block, size_t size) {
   _Static_assert(sizeof(ist_asset_t) == 64, "handle");
   return ist_asset_view((char*)block + sizeof(ist_asset_t), size, (ist_asset_t*)block);
@@ -123,7 +123,7 @@ EXPORT(penetration) ist_status_t penetration(solid_t a, solid_t b) {
   return ist_penetration(&first, &second, &desk.settings, &desk.workspace, &desk.penetration);
 }
 
-/* numbers[0]: the largest distance that matters, 0: any. */
+/* numbers[0]: the largest relevant distance, 0: any. */
 EXPORT(separation) ist_status_t separation(solid_t a, solid_t b, uint32_t inner_spheres) {
   const ist_placed_t first = placed(a, &desk.a), second = placed(b, &desk.b);
   const ist_separation_settings_t settings = {.size = sizeof settings,

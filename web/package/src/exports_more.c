@@ -1,5 +1,4 @@
-/* Protrusion, fit, wrenches, rays, points, motions and batches, as a page's JavaScript calls them.
- */
+/* Protrusion, fit, wrenches, rays, points, motions and batches for JavaScript. */
 #include "desk.h"
 
 /* --- Of answers that lie on the desk ---------------------------------------------------------- */
@@ -22,7 +21,7 @@ EXPORT(size_match) ist_status_t size_match(solid_t a, solid_t b) {
   return ist_get_size_match(&first, &second, &desk.fit);
 }
 
-/* Of the penetration or, if `is_patch`, of the first patch; points lie in `numbers`. */
+/* For the penetration or, if `is_patch`, the first patch; points are in `numbers`. */
 EXPORT(wrenches) ist_status_t wrenches(int32_t is_patch) {
   const double *const of_a = desk.numbers, *const of_b = desk.numbers + 3;
   return is_patch ? ist_patch_wrenches(&desk.patches[0], &desk.b.pose, of_a, of_b, &desk.wrenches)
@@ -54,13 +53,13 @@ _Static_assert(sizeof(ist_surface_point_t) == 72 && sizeof(ist_yes_no_t) == 4, "
 /* --- Motions: of place B, from there to place A ------------------------------------------------
  */
 
-/* `numbers`: duration, then the point that goes straight on. The motion goes to motion_b. */
+/* `numbers`: duration, then the point that moves straight. Writes the motion to motion_b. */
 EXPORT(motion_between) ist_status_t motion_between(void) {
   return ist_motion_between(&desk.b.pose, &desk.a.pose, desk.numbers[0], desk.numbers + 1,
                             desk.b.scale, &desk.motion_b);
 }
 
-/* `numbers`: the time. Place B is written over. */
+/* `numbers`: the time. Overwrites place B. */
 EXPORT(moved) ist_status_t moved(void) {
   return ist_moved(&desk.b.pose, desk.b.scale, &desk.motion_b, desk.numbers[0], &desk.b.pose);
 }
@@ -92,7 +91,7 @@ void penetration_batch(const asked_pair_t* pairs, size_t count, ist_penetration_
   }
 }
 
-/* `patches`: room for `most` a pair, of which counts[i] are written. */
+/* `patches`: memory for `most` patches a pair, of which counts[i] are written. */
 EXPORT(contact_patches_batch)
 void contact_patches_batch(const asked_pair_t* pairs, size_t count, ist_penetration_t* wholes,
                            ist_contact_patch_t* patches, uint32_t most, uint32_t* counts) {

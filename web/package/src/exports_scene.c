@@ -1,4 +1,4 @@
-/* Scenes, as a page's JavaScript calls them. */
+/* Scenes for JavaScript. */
 #include <ist/c_scene.h>
 #include <stdlib.h>
 
@@ -59,14 +59,14 @@ ist_status_t scene_join(ist_scene_t* scene, uint32_t a, uint32_t b, uint32_t joi
   return ist_scene_join(scene, a, b, joined);
 }
 
-/* What it finds is written to `step`, which stays until the next call. */
+/* Writes the results to `step`, valid until the next call. */
 EXPORT(scene_step) ist_status_t scene_step(ist_scene_t* scene, ist_scene_step_t* step) {
   step->size = sizeof *step;
   return ist_scene_take_step(scene, NULL, step);
 }
 _Static_assert(sizeof(ist_scene_step_t) == 36 && sizeof(ist_scene_pair_t) == 24, "step");
 
-/* The answers to a pair of the last step go to the desk. Returns the status of the penetration. */
+/* Writes the answers of a pair of the last step to the desk. Returns the status of the penetration. */
 EXPORT(scene_answers)
 ist_status_t scene_answers(const ist_scene_t* scene, const ist_scene_pair_t* pair) {
   ist_scene_get_separation(scene, pair, &desk.separation);

@@ -1,8 +1,8 @@
 #pragma once
 
 // Comes before every source. Highway's own target for WebAssembly (1.0.3) has no doubles, and its
-// portable one is loops of single numbers. So Highway is told that this is x86 with SSSE3, which
-// emscripten has in terms of WebAssembly's vectors.
+// portable one is loops of single numbers. So Highway is configured for x86 with SSSE3, which
+// emscripten implements by WebAssembly's vectors.
 
 #include <hwy/detect_compiler_arch.h>
 
@@ -15,7 +15,7 @@
 
 #include <hwy/base.h>
 
-// The compiler knows no such target, and what it is told on the command line is enough.
+// The compiler knows no such target; its command line suffices.
 #undef HWY_PUSH_ATTRIBUTES
 #define HWY_PUSH_ATTRIBUTES(targets)
 #undef HWY_POP_ATTRIBUTES

@@ -7,7 +7,7 @@ import {checkOptions} from './options.js';
 let wasm = null;
 let loading = null;
 
-// Of the memory as it is now: growing detaches what was there before.
+// Views of the current memory: growing detaches older views.
 let doubles, words, bytes;
 
 function refresh() {
@@ -18,7 +18,7 @@ function refresh() {
   bytes = new Uint8Array(buffer);
 }
 
-/** What WebAssembly asks of its host. */
+/** The imports of the WebAssembly. */
 const imports = {
   env: {
     emscripten_notify_memory_growth: () => {
@@ -57,7 +57,7 @@ async function instantiated(source) {
           `ist: ${given.url} cannot be fetched: ${given.status} ${given.statusText}. ${kRemedy}`);
     const address = given.url;
     given = await given.arrayBuffer();
-    // A page of a server that answers everything.
+    // Detects a server that answers every request with a page.
     const magic = new Uint8Array(given, 0, Math.min(4, given.byteLength));
     if (String.fromCharCode(...magic) !== '\0asm')
       throw new IstError(
@@ -91,7 +91,7 @@ async function start(source) {
   }
 }
 
-/** Loads the module, once: from where the options of init() say, else from what `usual()` says. */
+/** Loads the module once, from the source in the options of init(), else from `usual()`. */
 export async function load(options, usual) {
   checkOptions('init()', options);
   loading ??= start(options?.wasm ?? usual()).catch((error) => {
@@ -101,7 +101,7 @@ export async function load(options, usual) {
   return loading;
 }
 
-/** The module's functions, for what `who` is about to do. */
+/** The module's functions; `who`: the caller, for messages. */
 export function functions(who) {
   if (wasm === null)
     throw new IstError(
@@ -110,7 +110,7 @@ export function functions(who) {
   return wasm;
 }
 
-// Views of the memory, as it is now.
+// Views of the current memory.
 export function f64() {
   refresh();
   return doubles;
@@ -134,7 +134,7 @@ export function give(place) {
   wasm.give(place);
 }
 
-/** Room for `size` bytes while `use(place)` runs. */
+/** Allocates `size` bytes while `use(place)` runs. */
 export function withRoom(size, use) {
   const place = take(size);
   try {
@@ -144,7 +144,7 @@ export function withRoom(size, use) {
   }
 }
 
-/** Room that is kept from call to call, as large as the largest of them asked for. */
+/** Memory that is kept from call to call, as large as the largest request. */
 export class Room {
   #place = 0;
   #size = 0;
@@ -160,14 +160,14 @@ export class Room {
   }
 }
 
-/** The library's words for a status. */
+/** The library's message for a status. */
 export function describe(status) {
   const memory = u8();
   const start = wasm.describe(status) >>> 0;
   return new TextDecoder().decode(memory.subarray(start, memory.indexOf(0, start)));
 }
 
-/** Throws if `status` is an error; `what` was asked or read. */
+/** Throws if `status` is an error; `what`: the query or the object read. */
 export function check(status, what) {
   if (status < 0) throw new IstError(`ist: ${what}: ${describe(status)}`, status);
 }

@@ -1,4 +1,4 @@
-// Names that options may have: others are misspelt.
+// Valid names of options: others are misspelt.
 
 const kLimits = ['maxVisits', 'poseA', 'into'];
 const kContact = [...kLimits, 'measure', 'spheresOnly', 'relativeError', 'pairBudget', 'pairId'];

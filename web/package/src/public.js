@@ -1,4 +1,4 @@
-// What every build of the package has; init() is each one's own.
+// The common part of all builds of the package; each has its own init().
 
 import {functions} from './memory.js';
 

@@ -7,7 +7,7 @@ import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
 import {checkOptions} from './options.js';
 
-/** As exports.c takes it: a shape's place is odd. */
+/** The address in the form of exports.c: that of a shape is odd. */
 export function solid(given, which, query) {
   if (given instanceof Asset) return given._at;
   if (given instanceof Shape) return given._at + 1;
@@ -22,8 +22,8 @@ function assetsOf(a, b, query, what) {
 }
 
 /**
- * Puts a question on the desk and asks it: `question` names an export. Returns the status, no
- * error.
+ * Writes a query to the desk and runs it: `question` names an export. Returns the status, which is
+ * no error.
  */
 export function ask(question, who, a, b, poseB, options, more) {
   const wasm = functions(who);
@@ -53,7 +53,7 @@ export function separation(a, b, poseB, options) {
   return readSeparation(status, options?.into ?? newSeparation());
 }
 
-/** The one that lies on the desk. */
+/** Reads the separation on the desk. */
 export function readSeparation(status, out) {
   const integers = u32(), at = desk().separation / 8 + 1;
   out.status = statusOf(status);

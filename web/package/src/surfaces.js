@@ -28,7 +28,7 @@ function writeRow(place, given, row, what) {
   }
 }
 
-/** One alone that cannot be answered is an error; of many it is NaN. */
+/** A single row that cannot be answered is an error; among many it is NaN. */
 export function checkRows(status, count, who) {
   if (status !== kInvalidInput || count === 1) check(status, who);
 }
@@ -57,7 +57,7 @@ export function read(place, count, columns, out) {
   return out;
 }
 
-/** Writes rays, leaves room for a hit and `more` bytes of each; where rays and hits lie. */
+/** Writes rays, allocates a hit and `more` bytes for each; returns the addresses of rays and hits. */
 export function askRays(who, origins, directions, options, more) {
   functions(who);
   checkOptions(who, options);
@@ -82,7 +82,7 @@ export function raycast(given, pose, origins, directions, options) {
   return read(hits, count, kHit, options?.into ?? {});
 }
 
-/** Writes points, leaves room for an answer of so many bytes each; where both lie. */
+/** Writes points, allocates an answer of so many bytes for each; returns both addresses. */
 export function placePoints(who, points, options, bytes) {
   functions(who);
   checkOptions(who, options);
@@ -92,7 +92,7 @@ export function placePoints(who, points, options, bytes) {
   return {place, count, answers};
 }
 
-/** The same, and asks; where answers lie. */
+/** The same, and runs the query; returns the address of the answers. */
 function askPoints(question, who, given, pose, points, options, bytes) {
   const {place, count, answers} = placePoints(who, points, options, bytes);
   ask(question, who, given, pose, count, place, answers);

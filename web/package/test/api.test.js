@@ -215,7 +215,7 @@ test('outlines: closed curves, a patch at a time', () => {
   const ends = (first) => Array.from(patch, (p, i) => [p, ...segments.subarray(6 * i + first, 6 * i + first + 3)].join());
   assert.deepEqual(ends(0).sort(), ends(3).sort());
   assert.ok(contact.count > 0 && patch.every((p) => p < contact.count));
-  // Stokes: the push is what the outline encloses.
+  // Stokes: the force is the area that the outline encloses.
   const force = [0, 0, 0];
   for (let i = 0; i < count; ++i) {
     const [x, y, z, u, v, w] = segments.subarray(6 * i);
@@ -330,7 +330,7 @@ test('wrenches about any point, and how two assets suit', () => {
   assert.ok(fit.fits && fit.ratio >= 1 && fit.featureSizeA > 0);
   const small = {scale: 0.01, translation: [4, 0, 10]}, unlike = ist.sizeMatch(a, b, {scaleB: 0.01});
   assert.ok(unlike.needsMesh && unlike.hasMesh && unlike.fits);
-  // There the meshes answer, unless it is spheres that are wanted.
+  // The meshes answer in this case, unless only spheres are requested.
   const meshes = ist.penetration(a, b, small, {measure: 'exact'}).volume;
   assert.equal(ist.penetration(a, b, small).volume, meshes);
   assert.notEqual(ist.penetration(a, b, small, {spheresOnly: true}).volume, meshes);
@@ -511,7 +511,7 @@ test('memory comes back', () => {
   freed();
   const before = process.memoryUsage().arrayBuffers + process.memoryUsage().external;
   freed();
-  const b = ist.Asset.from(bytesB);  // after growing, what is asked next sees the new memory
+  const b = ist.Asset.from(bytesB);  // after growing, the next query sees the new memory
   assert.ok(ist.penetration(b, b, {translation: [0.1, 0, 0]}).volume > 0);
   assert.ok(process.memoryUsage().arrayBuffers + process.memoryUsage().external < before + 5e7);
   b.free();
@@ -587,7 +587,7 @@ test('rays and points against one solid', () => {
   assert.ok(feet.error.every((error) => error >= 0 && error < 1e-6));
   assert.deepEqual(Array.from(feet.gradient.subarray(0, 3)), [0, 0, -1]);
 
-  // Of a shape; NaN among many, a sentence for one alone.
+  // Shapes: NaN among many points, an error for one alone.
   const many = ist.closestPoint(ball, {}, [3, 0, 0, NaN, 0, 0]);
   assert.deepEqual(Array.from(many.distance), [1, NaN]);
   assert.deepEqual(Array.from(ist.contains(ball, {}, [1, 0, 0, NaN, 0, 0])), [1, 2]);

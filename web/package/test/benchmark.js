@@ -1,4 +1,4 @@
-// Size of the package, and times of its queries beside the native library's in the same run:
+// Size of the package, and times of its queries compared with the native library's in the same run:
 // ./dev web bench
 
 import * as ist from 'ist-query';

@@ -18,7 +18,7 @@ const kTypes = {
 
 /**
  * Serves files: `folders` by prefix of their address, longest first. `port` 0: any.
- * Says where, and how to end it.
+ * Returns the address, and a function that stops it.
  */
 export async function serve(folders, port = 0) {
   const prefixes = Object.keys(folders).sort((a, b) => b.length - a.length);
@@ -48,7 +48,7 @@ export function browser() {
   });
 }
 
-/** A page at an address; what it complains about goes to `complaints`. */
+/** A page at an address; its errors go to `complaints`. */
 export async function open(chrome, url, complaints = []) {
   const page = await chrome.newPage();
   page.on('console', (message) => {

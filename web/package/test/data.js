@@ -1,4 +1,4 @@
-// What the tests and the benchmark ask about: assets baked with build/bin/ist, and tables of poses.
+// Data of the tests and the benchmark: assets baked with build/bin/ist, and tables of poses.
 
 import {execFileSync} from 'node:child_process';
 import {existsSync, mkdirSync, readFileSync, writeFileSync} from 'node:fs';
@@ -58,9 +58,9 @@ function nutPoses() {
   return path;
 }
 
-/** Whether the oracle's tables are here. */
+/** True if the oracle's tables exist. */
 export const hasOracle = existsSync(join(shared, 'oracle'));
-/** A mesh of the shared data; undefined where it is not. */
+/** A mesh of the shared data; undefined if it does not exist. */
 export function sharedMesh(name) {
   const path = join(shared, 'meshes/dev', name);
   return existsSync(path) ? path : undefined;
@@ -92,7 +92,7 @@ export function pairs(spheres = 4000) {
   return made;
 }
 
-/** What the native library answers, and how long it takes [µs]. */
+/** The native library's answers and times [µs]. */
 export function nativeAnswers({a, b, csv}) {
   return execFileSync(nativeRows, [a, b, csv], {encoding: 'utf8', maxBuffer: 1 << 28});
 }

@@ -1,4 +1,4 @@
-// Makes what the tests ask about.
+// Makes the data of the tests.
 import {pairs} from './data.js';
 
 for (const {name} of pairs()) console.log(name);

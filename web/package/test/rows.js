@@ -1,5 +1,5 @@
-// Every query of a table of poses, as bits: what tests/c_api/native_rows.c prints. For Node and
-// pages.
+// Answers of every query of a table of poses, as bits, in the format of tests/c_api/native_rows.c.
+// For Node and pages.
 
 const buffer = new DataView(new ArrayBuffer(8));
 function hex(number) {
@@ -45,7 +45,7 @@ const patchBits = (patches) => patches.flatMap(
          ...hexes(p.torque),
 ]);
 
-/** What tests/c_api/native_rows.c asks under the same names. */
+/** The queries of tests/c_api/native_rows.c under the same names. */
 function moreQueries(ist, a, b, halfSpace) {
   const identity = {};
   return {
@@ -117,7 +117,7 @@ function moreQueries(ist, a, b, halfSpace) {
   };
 }
 
-/** By name: what is asked of a row, and its answer as bits. `ist`: a build of the package. */
+/** By name: the query of a row, which returns its answer as bits. `ist`: a build of the package. */
 export function queries(ist, a, b) {
   const halfSpace = ist.Shape.halfSpace([0, 0.6, 0.8], 0.0625);
   const box = ist.Shape.box([0.25, 0.5, 0.125]);
@@ -218,7 +218,7 @@ export function queries(ist, a, b) {
   };
 }
 
-/** All answers as native_rows prints them. */
+/** All answers in the format of native_rows. */
 export function rowsText(ist, bytesA, bytesB, csv) {
   const a = ist.Asset.from(bytesA, 'A'), b = ist.Asset.from(bytesB, 'B');
   const asked = Object.entries(queries(ist, a, b));

@@ -22,7 +22,7 @@ export function balls(data, size, material) {
       const r = data[i + 3];
       mesh.setMatrixAt(n, matrix.makeScale(r, r, r).setPosition(data[i], data[i + 1], data[i + 2]));
     });
-    // A shade of its own lets a ball be told from those it touches.
+    // Different shades distinguish touching balls.
     places.forEach(
         (i, n) => mesh.setColorAt(n, shade.setScalar(0.8 + 0.36 * ((0.618034 * n) % 1))));
     mesh.frustumCulled = false;

@@ -32,7 +32,7 @@ export class Columns {
           for (let x = Math.floor(Math.min(ax, bx, cx)); x <= right; ++x) act(y * side + x, t);
       }
     };
-    // Where each column's list begins, the end of the last, then the lists.
+    // The begin of each column's list, the end of the last, then the lists.
     const begins = new Uint32Array(side * side + 1);
     eachColumn((column) => ++begins[column]);
     let end = begins.length;

@@ -1,10 +1,10 @@
-// What is known of two solids at a pose: every query that the page shows, into the same answers.
+// The queries of two solids at a pose that the page shows, with reused answers.
 
 import {contactPatches, overlapOutline, penetration, separation} from 'ist-query';
 
 export const kMostPatches = 16;
 const kTimedFor = 5;    // [ms] a browser's clock is coarse
-export const kTimedOften = 16;  // times, of which the least is told
+export const kTimedOften = 16;  // times; the least is shown
 
 export class Contact {
   constructor(a, b) {
@@ -22,7 +22,7 @@ export class Contact {
     this.timed = 0;
   }
 
-  /** Asks at a pose of B, for patches and the overlap's outline only where they are shown. */
+  /** Queries a pose of B; patches and the overlap's outline only if they are shown. */
   ask(pose, {patches, overlap}) {
     const {a, b, options, hasMeshes} = this;
     this.askSpheres(pose);
@@ -46,12 +46,12 @@ export class Contact {
     this.exact = options.exact.into = penetration(a, b, pose, options.exact);
   }
 
-  /** The true overlap; by spheres where a solid keeps no mesh. */
+  /** The true overlap; by spheres if a solid has no mesh. */
   get best() {
     return this.exact ?? this.spheres;
   }
 
-  /** Takes the times of what was asked last, a little each frame; whether there is something new. */
+  /** Measures the last queries, a little each frame; returns true if there are new times. */
   time(pose) {
     if (this.timed === kTimedOften) return false;
     const {times} = this;

@@ -1,4 +1,4 @@
-// The page's parts by name, and what it says when something fails.
+// The page's elements by name, and its error messages.
 
 export const $ = (id) => document.getElementById(id);
 
@@ -11,7 +11,7 @@ export function tell(error) {
 export function untell() {
   $('alert').hidden = true;
 }
-/** Runs what may fail; the page says why it did. */
+/** Runs a function that may fail; the page then shows the reason. */
 export async function attempt(act) {
   try {
     await act();

@@ -1,4 +1,4 @@
-// A visitor's files, dropped or chosen: what they hold, or a sentence on why nothing.
+// A visitor's files, dropped or chosen: their contents, or a sentence that explains the failure.
 
 import {Asset} from 'ist-query';
 import {GLTFLoader} from 'three/addons/loaders/GLTFLoader.js';
@@ -8,8 +8,8 @@ const kMost = 512 * 2 ** 20;  // bytes
 const kMeshes = ['obj', 'stl', 'ply', 'off', 'glb', 'gltf', 'dae'];
 
 /**
- * What a file is: {kind: 'solid', asset} or {kind: 'scene', scene, animations}. Throws an Error with
- * a sentence.
+ * Returns {kind: 'solid', asset} or {kind: 'scene', scene, animations}. Throws an Error whose message
+ * is a sentence.
  */
 export async function readFile(file) {
   const ending = file.name.toLowerCase().split('.').pop();
@@ -57,7 +57,7 @@ function isMesh(name) {
       `${baked}. The solids shown have not changed.`);
 }
 
-/** Calls `take(files)` for what is dropped on the page; `hint` shows while it is held over it. */
+/** Calls `take(files)` for files dropped on the page; `hint` is visible while they are held over it. */
 export function acceptDrops(hint, take) {
   let depth = 0;
   const holdsFiles = (event) => event.dataTransfer?.types.includes('Files');

@@ -1,6 +1,6 @@
 // Numbers as they are printed.
 
-/** The digits that `ist query` prints, with trailing zeros, so that columns stand still. */
+/** The digits of `ist query`, with trailing zeros, so that columns do not move. */
 export function digits(x, count = 6) {
   if (x === 0) return '0';
   const exponent = Number(x.toExponential(count - 1).split('e')[1]);
@@ -23,7 +23,7 @@ export function vector(v, count = 4) {
 
 export const whole = (x) => Math.round(x).toLocaleString('en').replaceAll('.', ',');
 
-/** From … to, a power of ten told once. */
+/** From … to, with a single power of ten. */
 export function range(low, high, count = 6) {
   if (high === 0) return '0';
   const [a, b] = [digits(low, count), digits(high, count)];

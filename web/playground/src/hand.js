@@ -1,4 +1,4 @@
-// Solids of which one, B, is in a visitor's hand: what moves it, and where all are seen from.
+// Solids, one of which, B, is in a visitor's hand: its motion, and the camera.
 
 import * as THREE from 'three';
 
@@ -14,7 +14,7 @@ export class Hand {
     });
   }
 
-  /** Whether they are on the stage. */
+  /** Shows or hides the solids. */
   setVisible(visible) {
     for (const {group} of this.solids) group.visible = visible;
     if (visible)
@@ -50,7 +50,7 @@ export class Hand {
     this.touched();
   }
 
-  /** Takes B's own motion away. */
+  /** Stops B's own motion. */
   still() {}
 
   touched() {
@@ -58,7 +58,7 @@ export class Hand {
     this.view.dirty = true;
   }
 
-  /** Sees all solids whole, on a floor below. */
+  /** Places the camera to show all solids, on a floor below. */
   frame() {
     const box = new THREE.Box3();
     for (const {bounds, group} of this.solids) {
@@ -82,7 +82,7 @@ export class Hand {
   }
 }
 
-/** Where an Object3D stands, as queries take it. */
+/** The pose of an Object3D for queries. */
 export function poseOf({position, quaternion: {x, y, z, w}}, into = {
   rotation: [],
   translation: []

@@ -5,7 +5,7 @@ import * as THREE from 'three';
 const kLeastStep = 1 / 512, kMostStep = 1 / 4;  // of B's radius
 
 export class Keys {
-  /** `world()` says right, up and near [unit], and B's radius; `act` holds what keys do. */
+  /** `world()` returns right, up and near [unit], and B's radius; `act` contains the keys' actions. */
   constructor(holder, world, act) {
     this.world = world;
     this.act = act;

@@ -14,7 +14,7 @@ const kGravity = 8;     // [B's radii/s²]
 const kFastest = 14;    // [B's radii/s] keeps B from jumping through A in a step
 const kDepth = 0.01;    // [B's radii] how deep B rests on kArea of its squared radius
 const kArea = 0.2;
-const kFriction = 0.35;  // unless told otherwise
+const kFriction = 0.35;  // by default
 const kDrag = 0.15;      // [1/s] of air
 const kRollingDrag = 6;  // [1/s] of turns, times friction, while B touches
 const kCalmFor = 0.75;   // [s] B rests once it moved less than kCalm for so long
@@ -48,7 +48,7 @@ export class LetGo {
     this.still();
   }
 
-  /** Takes all motion away, as a hand does. */
+  /** Stops all motion, like a hand. */
   still() {
     this.velocity.set(0, 0, 0);
     this.spin.set(0, 0, 0);
@@ -60,7 +60,7 @@ export class LetGo {
     return this.calm >= kCalmFor;
   }
 
-  /** Moves B (an Object3D) on by a frame's time [s]; whether it moved. */
+  /** Advances B (an Object3D) by a frame's time [s]; returns true if it moved. */
   advance(body, seconds) {
     if (this.resting) return false;
     this.owed = Math.min(this.owed + seconds, 1 / 20);
@@ -113,7 +113,7 @@ export class LetGo {
     this.calm = moves < kCalm ? this.calm + kStep : 0;
   }
 
-  /** What one solid does to B, added to force and torque about B's origin. */
+  /** Adds one solid's action on B to force and torque about B's origin. */
   push(contact, body) {
     const {solid, options, memory} = contact;
     if (overlap(solid, this.b, poseOf(body, pose)) === 'no') {

@@ -1,4 +1,4 @@
-// What the page shows: pairs, parts and scenes that it offers, and a visitor's own.
+// The content of the page: the pairs, parts and scenes that it offers, and a visitor's own.
 
 import {Asset} from 'ist-query';
 
@@ -42,7 +42,7 @@ export class Library {
     for (const count of sphereCounts) $('spheres').append(new Option(whole(count), count));
   }
 
-  /** Shows what is chosen. What was chosen before is dropped if it arrives later. */
+  /** Shows the chosen item. Earlier choices that arrive later are dropped. */
   async choose() {
     const id = $('pair').value, mine = this.latest = {};
     const [pair, tray, scene] =
@@ -117,7 +117,7 @@ export class Library {
     this.enterScene(scene);
   }
 
-  /** Throws where files of these kinds make nothing to show. */
+  /** Throws if files of these kinds cannot be shown together. */
   check(kinds) {
     const solids = kinds.filter((kind) => kind === 'solid').length;
     if (solids > 2) throw new Error(`Two solids at a time: these are ${solids}.`);
@@ -128,7 +128,7 @@ export class Library {
   takeSolids(solids) {
     const {world} = this;
     if (solids.length === 0) return;
-    this.latest = {};  // what is on its way is not wanted any more
+    this.latest = {};  // pending items are no longer wanted
     $('loading').hidden = true;
     this.enter(this.world);
     // One alone is the new B.
@@ -147,7 +147,7 @@ export class Library {
     $('pair').value = kOwn;
   }
 
-  // --- What is on the stage
+  // --- The stage
 
   /** Puts the world, the tray or the player on the stage. */
   enter(stage) {

@@ -1,4 +1,4 @@
-// The overlap of two solids as it is: the surface of each inside the other, and the outline on which
+// The exact overlap of two solids: the surface of each inside the other, and the outline on which
 // the surfaces cross.
 
 import * as THREE from 'three';
@@ -10,7 +10,7 @@ import {kIsInside} from './columns.js';
 import {colour} from './theme.js';
 
 const kLineWidth = 1.5;  // [px]
-/** Of a solid's radius: points of its surface are looked at so far below, lest flush faces flicker. */
+/** Share of a solid's radius: surface points are tested this far below, so that flush faces do not flicker. */
 const kBelow = 1e-4;
 
 export class Overlap {
@@ -32,7 +32,7 @@ export class Overlap {
     }
   }
 
-  /** Takes two solids; nothing is drawn where one holds no mesh. */
+  /** Sets the two solids; nothing is drawn if one has no mesh. */
   hold(a, b) {
     const drawn = a.info.meshTriangles > 0 && b.info.meshTriangles > 0;
     [[a, b], [b, a]].forEach(([own, other], k) => {
@@ -91,7 +91,7 @@ export function paint(colour = 0xffffff, material = new THREE.MeshStandardMateri
   return material;
 }
 
-/** Leaves of a surface what lies in the columns' solid. */
+/** Draws only the part of a surface inside the columns' solid. */
 function drawInside(shader, uniforms) {
   Object.assign(shader.uniforms, uniforms);
   shader.vertexShader = 'uniform mat4 toColumns;\nuniform float below;\nvarying vec3 vInColumns;\n' +

@@ -1,4 +1,4 @@
-// What is known of a contact, drawn over the solids: force and torque, patches, the overlap, the gap.
+// A contact drawn over the solids: force and torque, patches, the overlap, the gap.
 
 import * as THREE from 'three';
 
@@ -49,7 +49,7 @@ export class Overlays extends Top {
     this.overlap.recolour();
   }
 
-  /** Of a contact that was asked; `size` [u] is that of the smaller solid; `a` and `b` hold them. */
+  /** Draws a contact; `size` [u] is that of the smaller solid; `a` and `b` contain the solids. */
   update({best, separation, patches, outline}, size, a, b) {
     const touching = best.volume > 0;
     this.scene.visible = true;
@@ -112,7 +112,7 @@ export class Overlays extends Top {
   }
 }
 
-/** A length from a strength: seen while it is weak, and never off the screen. */
+/** A length from a magnitude: visible for small ones, and never off the screen. */
 const grown = (x) => 0.9 * (1 - Math.exp(-2 * Math.sqrt(x)));
 
 const matrix = new THREE.Matrix4(), turn = new THREE.Quaternion();

@@ -3,7 +3,7 @@
 import * as THREE from 'three';
 
 export class Player {
-  /** The form with its button, slider and output; `facts`: a list for what is known of a scene. */
+  /** The form with its button, slider and output; `facts`: a list for a scene's properties. */
   constructor({form, play, moment, told, facts, leave}, onLeave) {
     Object.assign(this, {form, play, moment, told, facts});
     play.onclick = () => this.setPlaying(!this.playing);
@@ -15,7 +15,7 @@ export class Player {
     form.onsubmit = () => false;
   }
 
-  /** Takes a scene into `into`; says its ball and its axis up, which glTF lays down. */
+  /** Adds a scene to `into`; returns its ball and its up axis, which glTF changes. */
   start({name, scene, animations}, into) {
     this.stop();
     this.scene = scene;
@@ -26,7 +26,7 @@ export class Player {
       if (!part.isMesh) return;
       ++bodies;
       part.frustumCulled = false;
-      // Plain default materials get a colour each, so that bodies are told apart.
+      // Plain default materials get different colours, so that bodies can be distinguished.
       if (!part.material.map && part.material.color?.getHex() === 0xffffff) {
         part.material = new THREE.MeshStandardMaterial(
             {color: bodyColour(this.count++), roughness: 0.55, metalness: 0.05});
@@ -79,7 +79,7 @@ export class Player {
     this.moved = true;
   }
 
-  /** On by a frame's time [s]; whether the scene changed. */
+  /** Advances by a frame's time [s]; returns true if the scene changed. */
   advance(seconds) {
     if (this.playing) this.seek((this.time + seconds) % this.duration);
     const {moved} = this;

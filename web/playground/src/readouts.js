@@ -2,7 +2,7 @@
 
 import {digits, range, vector, whole} from './format.js';
 
-// By name: what is told of the meshes and of the spheres; `wide` of both at once.
+// [name, label, unit, kind] of the rows for meshes and spheres; `wide` rows are for both.
 const kRows = [
   ['volume', 'Volume', 'u³', 'main'],
   ['error', 'Error', '%'],
@@ -16,7 +16,7 @@ const kRows = [
 const kOften = 100;  // [ms] numbers are written at most so often
 const kCalm = 900;   // [ms] words are said once nothing moved for so long
 
-/** What is told of a contact: written often, and said once nothing moves. */
+/** The readouts of a contact: written often, and announced once nothing moves. */
 export class Told {
   constructor(live) {
     this.live = live;
@@ -33,7 +33,7 @@ export class Told {
     this.stale = true;
   }
 
-  /** Every frame: writes what is due. */
+  /** Every frame: writes due readouts. */
   tick(now) {
     if (this.stale && now - this.written >= kOften) this.write(now);
     if (this.contact && !this.said && now - this.changed > kCalm) {
@@ -48,7 +48,7 @@ export class Told {
   }
 
   say(text) {
-    // The same words again are said again.
+    // Repeated words are announced again.
     this.live.textContent = this.live.textContent === text ? `${text} ` : text;
   }
 }

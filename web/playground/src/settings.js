@@ -1,4 +1,4 @@
-// The panel's settings: what of the solids is drawn, and how B is moved.
+// The panel's settings: how solids are drawn, and how B is moved.
 
 import {$} from './dom.js';
 import {whole} from './format.js';
@@ -38,7 +38,7 @@ export class Settings {
     this.tellLevels();
   }
 
-  /** `share`: of the way through A, from the eye. */
+  /** `share`: of the depth of A, from the eye. */
   setCut(share) {
     $('cut').value = 100 * share;
     $('cut-told').textContent = share === 0 ? 'off' : `${Math.round(100 * share)} %`;

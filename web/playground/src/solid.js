@@ -1,5 +1,4 @@
-// A solid as it is drawn: the mesh that its asset holds, its spheres at a level of detail, or a
-// level of its tree.
+// A drawn solid: its asset's mesh, its spheres at a level of detail, or a level of its tree.
 
 import * as THREE from 'three';
 import {toCreasedNormals} from 'three/addons/utils/BufferGeometryUtils.js';
@@ -8,8 +7,8 @@ import {balls} from './balls.js';
 import {Columns} from './columns.js';
 
 /**
- * What a cut lays open is filled: inner sides, which only a cut shows, are painted flat, and those
- * of balls at the depth of the plane. Where balls share a place that of the larger chord is seen.
+ * Fills cuts: inner sides, which only a cut shows, are painted flat, and those of balls at the depth
+ * of the plane. Where balls overlap, the one with the larger chord is visible.
  */
 function fillCuts(shader) {
   shader.vertexShader = 'varying vec4 vBall;\n' +
@@ -109,7 +108,7 @@ export class Solid {
     this.group.removeFromParent();
   }
 
-  // --- Below: what lies in the group
+  // --- Contents of the group
 
   mesh() {
     if (this.surface.geometry) return this.surface.geometry;
@@ -122,7 +121,7 @@ export class Solid {
     return this.surface.geometry;
   }
 
-  /** What tells a shader which points lie inside. */
+  /** Textures by which a shader finds inside points. */
   columns() {
     return this.surface.columns ??= new Columns(this.mesh().getAttribute('position').array);
   }

@@ -1,4 +1,4 @@
-// Many parts, of which a visitor takes any in hand, and the pairs that meet: a Scene of ist-query.
+// Many parts, any of which a visitor takes in hand, and the pairs that meet: a Scene of ist-query.
 
 import {Scene} from 'ist-query';
 import * as THREE from 'three';
@@ -10,13 +10,13 @@ import {Top} from './overlays.js';
 import {Solid} from './solid.js';
 import {colour} from './theme.js';
 
-/** [u] Parts as near as that are told too: a pair that barely touches does not come and go. */
+/** [u] Nearer parts are listed too, so that a pair that barely touches does not come and go. */
 const kMargin = 0.05;
 
 export class Tray extends Hand {
   /**
-   * `on`: what to call when the scene was asked (`asked`), when a step's time was taken (`timed`),
-   * when a visitor moved a part (`moved`) and when one was taken in hand (`taken`).
+   * `on`: callbacks after a query of the scene (`asked`), after a step was timed (`timed`), after a
+   * visitor moved a part (`moved`), and after one was taken in hand (`taken`).
    */
   constructor(view, on) {
     super(view, on);
@@ -106,7 +106,7 @@ export class Tray extends Hand {
 
   // --- A frame
 
-  /** Asks where anything moved, and brings what is drawn up to date. */
+  /** Queries if anything moved, and updates the drawing. */
   update() {
     if (!this.stale) {
       if (this.timed < kTimedOften) this.time();
@@ -147,7 +147,7 @@ export class Tray extends Hand {
     if (this.timed === kTimedOften) this.on.timed(this);
   }
 
-  /** Overlaps, and on each part how much of it overlaps: nothing that jumps as it vanishes. */
+  /** Draws overlaps, and how much of each part overlaps, without jumps as they vanish. */
   draw() {
     for (const solid of this.solids) solid.mark = 0;
     for (const pair of this.pairs.values()) {

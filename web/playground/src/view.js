@@ -44,7 +44,7 @@ export class View {
     this.resize();
   }
 
-  /** Puts the camera so that a ball is seen whole; `up` is 'y' or 'z'. */
+  /** Places the camera to show a whole ball; `up` is 'y' or 'z'. */
   frame(centre, radius, up) {
     this.up = new THREE.Vector3(0, up === 'y' ? 1 : 0, up === 'z' ? 1 : 0);
     // Towards the eye, along the floor.
@@ -99,7 +99,7 @@ export class View {
     this.dirty = true;
   }
 
-  /** Cuts away what is nearer than a share of the way through a box; says by which planes. */
+  /** Cuts away the nearer part of a box, up to a share of its depth; returns the planes. */
   setCut(share, centre, radius) {
     if (share === 0) return [];
     this.cut.normal.copy(this.near).negate();
@@ -116,7 +116,7 @@ export class View {
     this.dirty = true;
   }
 
-  /** Draws, if anything changed; `over` are what is drawn over everything. */
+  /** Draws, if anything changed; `over` is drawn over everything. */
   render(over) {
     if (!this.dirty) return;
     this.dirty = false;

@@ -1,4 +1,4 @@
-// The two solids, where B stands, and what is known of that: everything but the page around it.
+// The two solids, B's place, and their contact: everything except the page around it.
 
 import * as THREE from 'three';
 
@@ -11,8 +11,8 @@ import {colour} from './theme.js';
 
 export class World extends Hand {
   /**
-   * `on`: what to call when a contact was asked (`asked`), when its times were taken (`timed`),
-   * when a visitor moved B (`moved`) and when B was let go or held (`held`).
+   * `on`: callbacks after a query of a contact (`asked`), after it was timed (`timed`), after a
+   * visitor moved B (`moved`), and after B was let go or held (`held`).
    */
   constructor(view, on) {
     super(view, on);
@@ -93,7 +93,7 @@ export class World extends Hand {
 
   // --- What is drawn
 
-  /** Takes changed settings; how many levels the solids have is then in `levels()`. */
+  /** Applies changed settings; `levels()` then returns the solids' number of levels. */
   show(changed = {}) {
     Object.assign(this.settings, changed);
     if (!this.a) return;
@@ -133,7 +133,7 @@ export class World extends Hand {
 
   // --- A frame
 
-  /** Moves what is free, asks where anything moved, and brings the scene up to date. */
+  /** Moves free bodies, queries if anything moved, and updates the scene. */
   update(seconds) {
     if (!this.a) return;
     const {group} = this.b;

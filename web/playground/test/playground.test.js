@@ -45,7 +45,7 @@ test('any folder of any server of files will do', async (t) => {
   page.on('response', (answer) => answer.ok() || missing.push(answer.url()));
   for (const address of ['/some/folder/', '/some/folder/index.html']) {
     await page.goto(below.url + address);
-    // Times are told once they are taken, not those of the first queries.
+    // Times are shown once measured, not those of the first queries.
     await page.waitForFunction(
         () => /^[\d,]+$/.test(document.getElementById('read-time').textContent));
   }
@@ -67,7 +67,7 @@ test(
         await choose(page, pair);
         assert.ok(await page.locator('#alert').isHidden());
         assert.ok(await page.locator('#loading').isHidden());
-        // Something is seen at once: an overlap, in the middle of the view.
+        // An overlap is visible at once, in the middle of the view.
         const {volume, x, y} = await page.evaluate(() => {
           const {world, view} = playground;
           world.update(0);
@@ -161,7 +161,7 @@ test(
         }
         return times;
       });
-      // Of three rounds the best: others may be at work on this machine.
+      // The best of three rounds, as the machine may be busy.
       const means = [0, 1, 2].map(
           (round) => times.slice(150 * round, 150 * (round + 1)).reduce((a, b) => a + b) / 150);
       const [best, , worst] = means.toSorted((a, b) => a - b);

@@ -73,7 +73,7 @@ test(
       await page.mouse.move(x, y);
       assert.equal(await page.evaluate(() => playground.view.holder.style.cursor), 'grab');
       await page.mouse.down();
-      // What shows for a moment is waited for before it can come.
+      // The wait for a short-lived element begins before it can appear.
       const begins = page.locator('#pairs .begins').first().waitFor();
       for (let i = 1; i <= 12; ++i) await page.mouse.move(x + 2 * i, y - 3 * i);
       await begins;
@@ -132,7 +132,7 @@ test(
           await page.keyboard.type(words);
           const chosen = await page.locator(`#${id}`).evaluate(({selectedOptions: [{text}]}) => text);
           if (chosen.startsWith(words)) return;
-          // Of letters typed slowly each chooses anew, and a space opens the list. The browser forgets them.
+          // Letters typed slowly each choose anew, and a space opens the list. Escape clears them.
           await page.keyboard.press('Escape');
           await page.waitForTimeout(1500);
         }
@@ -272,7 +272,7 @@ for (const [name, options] of [['desk', kDesk], ['phone', kPhone]]) {
 test(
     'words are said once B rests, not while it moves',
     () => visit(async (page) => {
-      // By a clock of its own, as the page's may be slow here.
+      // Uses a clock of its own, as the page's may be slow here.
       const said = await page.evaluate(() => {
         const {readouts, world} = playground, words = [];
         readouts.say = (text) => words.push(text);

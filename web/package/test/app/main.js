@@ -1,4 +1,4 @@
-// What a user's app is: both builds of the package, by name.
+// A user's app: imports both builds of the package by name.
 import * as plain from 'ist-query';
 import * as compat from 'ist-query/compat';
 

@@ -1,4 +1,4 @@
-// Compiles only if the types say what docs/web.md does.
+// Compiles only if the types agree with docs/web.md.
 import {
   Asset, Shape, IstError, closestPoint, contains, contactPatches, contactPatchesBatch, init, lenses, motionBetween, moved, overlap, overlapOutline, sizeMatch,
   patchesWithoutProtrusion, penetration, penetrationBatch, raycast, separation, timeOfImpact, version, withoutProtrusion, wrenches,
