@@ -1,7 +1,6 @@
 #include "clash/assembly.h"
 
 #include <fmt/format.h>
-#include <fnmatch.h>
 #include <ist/bake.h>
 #include <algorithm>
 #include <cmath>
@@ -19,9 +18,33 @@ namespace {
 
 using Pattern = ClashSource::Patterns;
 
+/// `*` stands for any letters and `?` for one, in UTF-8; brackets and all else for themselves.
+bool stands_for(const std::string& pattern, const std::string& name) {
+  std::size_t p = 0, n = 0, star = std::string::npos, from = 0;
+  const auto next_letter = [&](std::size_t at) {
+    do ++at;
+    while (at < name.size() && (name[at] & 0xc0) == 0x80);
+    return at;
+  };
+  while (n < name.size()) {
+    if (p < pattern.size() && pattern[p] == '*') {
+      star = p++;
+      from = n;
+    } else if (p < pattern.size() && (pattern[p] == '?' || pattern[p] == name[n])) {
+      n = pattern[p++] == '?' ? next_letter(n) : n + 1;
+    } else if (star != std::string::npos) {
+      p = star + 1;
+      n = from = next_letter(from);
+    } else {
+      return false;
+    }
+  }
+  return pattern.find_first_not_of('*', p) == std::string::npos;
+}
+
 bool names(const Pattern& patterns, const std::string& name) {
   return std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) {
-    return pattern == name || fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
+    return pattern == name || stands_for(pattern, name);
   });
 }
 

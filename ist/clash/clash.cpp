@@ -351,12 +351,15 @@ class PairQuery {
   void measure_exit(Clash& out, const Sums& whole) {
     const Vector3d by =
         std::min(kFlush * std::min(a_.diameter, b_.diameter), 1e-3 * out.depth) * out.direction;
-    Vector3d force = aside(-by).force;
-    if ((force - whole.force).norm() > 1e-4 * whole.force.norm())
-      force = (force + aside(by).force) / 2;
+    Vector3d force = aside(-by).force, ahead = force;
+    if ((force - whole.force).norm() > 1e-4 * whole.force.norm()) {
+      ahead = aside(by).force;
+      force = (force + ahead) / 2;
+    }
     if (!(force.norm() > whole.area / 4)) return;
     out.direction = unit(force);
-    if (parts_ == 1) out.depth = whole.volume / force.norm();
+    // Faces that are flush across the way out count on the way out.
+    if (parts_ == 1) out.depth = whole.volume / std::max(force.norm(), ahead.dot(out.direction));
   }
 
   PlacedAsset moved(const Vector3d& by) const {

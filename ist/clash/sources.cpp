@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -198,6 +199,7 @@ void read_clash_scene(const std::string& path, ClashSource& out) {
   std::map<std::vector<double>, std::size_t>
       shapes;  // by mesh, and the part of the transform that is not a pose
   std::map<std::string, int> taken;
+  std::set<std::string> names;
   for (MeshScene::Part& part : scene.parts) {
     if ((*meshes)[part.mesh].triangles.empty()) {
       out.notes.push_back(fmt::format("{} has no triangles: it is no part", part.name));
@@ -229,8 +231,9 @@ void read_clash_scene(const std::string& path, ClashSource& out) {
     key.push_back(static_cast<double>(part.mesh));
     const auto [known, fresh] = shapes.try_emplace(key, out.shapes.size());
     one.shape = known->second;
-    const int before = taken[part.name]++;
-    one.name = before == 0 ? part.name : fmt::format("{}#{}", part.name, before + 1);
+    one.name = part.name;
+    for (int& count = taken[part.name]; !names.insert(one.name).second;)
+      one.name = fmt::format("{}#{}", part.name, ++count + 1);
     if (fresh)
       out.shapes.push_back({fmt::format("{}: {}", path, part.name),
                             [meshes, mesh = part.mesh, deformed] {
@@ -253,6 +256,9 @@ void read_clash_robot(const std::string& path, const RobotOptions& options, Clas
         fmt::format("left out, because they have visual shapes alone: {}; --visual "
                     "uses these",
                     fmt::join(unseen, ", ")));
+  if (!robot->endless.empty())
+    out.notes.push_back(fmt::format("left out, because planes and height fields are no solids: {}",
+                                    fmt::join(robot->endless, ", ")));
   const PackagePaths paths = package_paths(path, options);
   std::vector<std::size_t> links;
   std::size_t round = 0;

@@ -251,7 +251,10 @@ class SurfaceGap {
   Separation find() {
     // Pairs kept from the last step give a better bound than spheres.
     if (question_.kept == nullptr || question_.kept->nearest == KeptPairs::kNone) {
-      if (!lack_spheres(a_, b_)) ask_spheres();
+      if (!lack_spheres(a_, b_))
+        ask_spheres();
+      else
+        look_along({pose_.a_from_b.t[0], pose_.a_from_b.t[1], pose_.a_from_b.t[2]});
       if (overlap_) return answer({.overlap = true});
       if (question_.likely <= question_.enough) {
         Separation result;
@@ -285,7 +288,9 @@ class SurfaceGap {
     const SpherePair& nearest = descent.nearest();
     overlap_ = nearest.gap < -spheres.off;
     question_.likely = std::max(0.0, nearest.gap) + error_ + spheres.off;
-    const Eigen::Vector3d between = nearest.centre_b - nearest.centre_a;
+    look_along(nearest.centre_b - nearest.centre_a);
+  }
+  void look_along(const Eigen::Vector3d& between) {
     if (const double length = between.norm(); length > 0)
       question_.toward = {between.x() / length, between.y() / length, between.z() / length};
   }

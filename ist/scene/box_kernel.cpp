@@ -36,12 +36,13 @@ HWY_ATTR void place_all(const BodyBlock& block, std::uint32_t lanes, BlockBoxes&
     if ((lanes >> i & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
     const V q0 = hn::LoadU(d, block.q[0] + i), q1 = hn::LoadU(d, block.q[1] + i),
             q2 = hn::LoadU(d, block.q[2] + i), q3 = hn::LoadU(d, block.q[3] + i);
-    const V norm = hn::Sqrt((q0 * q0 + q1 * q1) + (q2 * q2 + q3 * q3));
-    Mask placed =
-        hn::And(norm >= constant(kShortestDirection), norm <= constant(kLongestDirection));
+    const V squares = (q0 * q0 + q1 * q1) + (q2 * q2 + q3 * q3);
+    Mask placed = squares == constant(1);
     V w = q0;
     Vec3 v = {q1, q2, q3};
-    if (!hn::AllTrue(d, norm == constant(1))) {  // bodies without a rotation skip this
+    if (!hn::AllTrue(d, placed)) {  // bodies without a rotation skip this
+      const V norm = hn::Sqrt(squares);
+      placed = hn::And(norm >= constant(kShortestDirection), norm <= constant(kLongestDirection));
       // (no lane divides by zero, or overflows)
       const V by = hn::IfThenElse(placed, norm, constant(1));
       const auto unit = [&](V q) { return hn::IfThenElseZero(placed, q) / by; };
@@ -62,6 +63,55 @@ HWY_ATTR void place_all(const BodyBlock& block, std::uint32_t lanes, BlockBoxes&
     }
     boxes.placed |= mask_bits(d, placed) << i;
   }
+}
+
+/// As BodyBlock::set_pose() of each: four numbers of four bodies at a time.
+HWY_INLINE void set_poses(const Pose* poses, BodyBlock& block) {
+#if HWY_MAX_BYTES < 32
+  for (std::size_t k = 0; k < BodyBlock::kCount; ++k) block.set_pose(k, poses[k]);
+#else
+  const hn::CappedTag<double, 4> d;
+  for (const std::size_t first : {0, 3})
+    for (std::size_t i = 0; i < BodyBlock::kCount; i += 4) {
+      const auto row = [&](std::size_t k) HWY_ATTR {
+        return hn::LoadU(d, reinterpret_cast<const double*>(poses + i + k) + first);
+      };
+      const auto column = [&](std::size_t c, hn::Vec<decltype(d)> v) HWY_ATTR {
+        hn::StoreU(v, d, (first + c < 4 ? block.q[first + c] : block.t[first + c - 4]) + i);
+      };
+      const auto r0 = row(0), r1 = row(1), r2 = row(2), r3 = row(3);
+      const auto even_01 = hn::InterleaveLower(d, r0, r1), odd_01 = hn::InterleaveUpper(d, r0, r1);
+      const auto even_23 = hn::InterleaveLower(d, r2, r3), odd_23 = hn::InterleaveUpper(d, r2, r3);
+      column(0, hn::ConcatLowerLower(d, even_23, even_01));
+      column(1, hn::ConcatLowerLower(d, odd_23, odd_01));
+      column(2, hn::ConcatUpperUpper(d, even_23, even_01));
+      column(3, hn::ConcatUpperUpper(d, odd_23, odd_01));
+    }
+#endif
+}
+
+HWY_ATTR bool put_all(const Pose* poses, BodyBlock& block, const std::uint32_t* lane_of,
+                      BoxNode* nodes) {
+  // Blocks come in a row.
+  constexpr std::size_t kAhead = 4, kLine = 64;
+  for (std::size_t i = 0; i < BodyBlock::kCount * sizeof(Pose); i += kLine)
+    __builtin_prefetch(reinterpret_cast<const char*>(poses + kAhead * BodyBlock::kCount) + i);
+  for (std::size_t i = 0; i < sizeof(BodyBlock); i += kLine)
+    __builtin_prefetch(reinterpret_cast<const char*>(&block + kAhead) + i);
+  set_poses(poses, block);
+  BlockBoxes boxes;
+  place_all(block, 0xff, boxes);
+  if (boxes.placed != 0xff) return false;
+#pragma GCC unroll 8
+  for (std::size_t k = 0; k < BodyBlock::kCount; ++k) {
+    BoxNode& node = nodes[lane_of[k] / BoxNode::kLanes];
+    const std::uint32_t lane = lane_of[k] % BoxNode::kLanes;
+    for (std::size_t c = 0; c < 3; ++c) {
+      node.low[c][lane] = boxes.low[c][k];
+      node.high[c][lane] = boxes.high[c][k];
+    }
+  }
+  return true;
 }
 
 using Floats = hn::CappedTag<float, BoxNode::kLanes>;
@@ -85,6 +135,27 @@ HWY_INLINE std::uint32_t meeting(const BoxNode& node, const BoxNode& of, std::ui
   }
   return out;
 }
+
+/// Lanes of nodes whose boxes meet that of a leaf, and the leaf: its bodies are looked at later,
+/// many such pairs in a row, so that no branch depends on how many there are of each.
+struct NearLeaves {
+  static constexpr std::size_t kRoom = 64;
+
+  /// Bits of the lanes of `node`.
+  HWY_INLINE void add(std::uint32_t leaf, std::uint32_t node, std::uint32_t lanes) {
+    const hn::CappedTag<std::uint32_t, BoxNode::kLanes> d;
+    const hn::Rebind<std::uint8_t, decltype(d)> d8;
+    for (std::size_t i = 0; i < BoxNode::kLanes; i += hn::Lanes(d)) {
+      const auto lane = hn::PromoteTo(d, hn::LoadU(d8, kSetBits[lanes].data() + i));
+      hn::StoreU(lane + hn::Set(d, BoxNode::kLanes * node), d, lane_of + count + i);
+      hn::StoreU(hn::Set(d, leaf), d, leaf_of + count + i);
+    }
+    count += static_cast<std::size_t>(count_bits(lanes));
+  }
+
+  std::size_t count = 0;
+  std::uint32_t leaf_of[kRoom + BoxNode::kLanes], lane_of[kRoom + BoxNode::kLanes];
+};
 
 HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
   constexpr std::uint32_t kLanes = BoxNode::kLanes;
@@ -121,8 +192,18 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
     }
     leave(at_a, at_b, left);
   };
+  NearLeaves near;
+  const auto look = [&]() HWY_ATTR {
+    for (std::size_t n = 0; n < near.count; ++n) {
+      const BoxNode &a = search.a[near.leaf_of[n]], &b = search.b[near.lane_of[n] / kLanes];
+      const std::uint32_t k = near.lane_of[n] % kLanes;
+      for (const std::uint32_t i : set_bits(meeting(a, b, k)))
+        out[count++] = {a.child[i], b.child[k]};
+    }
+    near.count = 0;
+  };
   // (64 pairs are the most of two nodes)
-  while (count + 64 <= PairSearch::kMost) {
+  while (count + 64 + kLanes * (NearLeaves::kRoom + kLanes) <= PairSearch::kMost) {
     if (search.depth == 0) {
       if (search.next == search.end) break;
       const std::uint32_t at = search.next++;
@@ -133,22 +214,31 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
       continue;
     }
     LanePairs& two = search.stack[search.depth - 1];
-    if (two.left == 0) {
-      --search.depth;
-      continue;
-    }
-    const auto bit = static_cast<std::uint32_t>(std::countr_zero(two.left));
-    two.left &= two.left - 1;
-    const std::uint32_t i = bit / kLanes, j = bit % kLanes;
     const BoxNode &a = search.a[two.a], &b = search.b[two.b];
-    const std::uint32_t child_a = a.child[i], child_b = b.child[j];
-    if (a.is_body(i))
+    std::uint32_t i = 0, j = 0, child_a = 0, child_b = 0;
+    std::uint64_t left = two.left;
+    bool of_leaves = true;
+    for (; left != 0 && of_leaves && near.count <= NearLeaves::kRoom; left &= left - 1) {
+      const auto bit = static_cast<std::uint32_t>(std::countr_zero(left));
+      i = bit / kLanes, j = bit % kLanes;
+      child_a = a.child[i], child_b = b.child[j];
+      of_leaves = !a.is_body(i) && !b.is_body(j) && search.a[child_a].is_leaf() &&
+                  search.b[child_b].is_leaf();
+      if (of_leaves) near.add(child_a, child_b, meeting(search.b[child_b], a, i));
+    }
+    two.left = left;
+    if (near.count > NearLeaves::kRoom) look();
+    if (of_leaves) {
+      search.depth -= left == 0;
+    } else if (a.is_body(i)) {
       between(two.a, 1u << i, child_b, 0);
-    else if (b.is_body(j))
+    } else if (b.is_body(j)) {
       between(child_a, meeting(search.a[child_a], b, j), two.b, 1u << j);
-    else
+    } else {
       between(child_a, meeting(search.a[child_a], b, j), child_b, 0);
+    }
   }
+  look();
   return count;
 }
 
@@ -180,6 +270,7 @@ HWY_AFTER_NAMESPACE();
 namespace ist {
 
 HWY_EXPORT(place_all);
+HWY_EXPORT(put_all);
 HWY_EXPORT(next_of);
 HWY_EXPORT(refit_all);
 
@@ -187,6 +278,10 @@ void place_boxes(const BodyBlock& block, std::uint32_t lanes, BlockBoxes& boxes)
   HWY_DYNAMIC_DISPATCH(place_all)(block, lanes, boxes);
 }
 
+bool put_poses(const Pose* poses, BodyBlock& block, const std::uint32_t* lane_of,
+               BoxNode* nodes) noexcept {
+  return HWY_DYNAMIC_DISPATCH(put_all)(poses, block, lane_of, nodes);
+}
 std::size_t next_pairs(PairSearch& search, BodyPair* out) noexcept {
   return HWY_DYNAMIC_DISPATCH(next_of)(search, out);
 }

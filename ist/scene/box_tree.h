@@ -8,9 +8,12 @@
 #include <span>
 #include <vector>
 
+#include <ist/types.h>
 #include "base/bits.h"
 
 namespace ist {
+
+struct BodyBlock;
 
 /// A box along the axes; floats, rounded outward.
 struct SceneBox {
@@ -60,6 +63,7 @@ struct alignas(64) BoxNode {
     }
   }
   bool is_body(std::uint32_t k) const noexcept { return (bodies >> k & 1) != 0; }
+  bool is_leaf() const noexcept { return bodies == used; }
   SceneBox box(std::uint32_t k) const noexcept {
     return {{low[0][k], low[1][k], low[2][k]}, {high[0][k], high[1][k], high[2][k]}};
   }
@@ -100,7 +104,7 @@ struct BodyPair {
 /// A search for pairs in two hierarchies, or in one: then within each of its nodes, and below the
 /// pairs found there.
 struct PairSearch {
-  static constexpr std::size_t kMost = 256;
+  static constexpr std::size_t kMost = 1024;
 
   const BoxNode *a, *b;
   std::uint32_t root_a, root_b;
@@ -116,6 +120,11 @@ std::size_t next_pairs(PairSearch& search, BodyPair* out) noexcept;
 /// Sets the boxes of nodes in those of their parents, which stand before them. Returns the sum of
 /// the nodes' areas.
 double refit_nodes(std::span<BoxNode> nodes) noexcept;
+
+/// Writes the poses of a block's bodies, and their boxes into the nodes that have them; false if
+/// floats do not hold all of these. lane_of: as BoxTree has it.
+bool put_poses(const Pose* poses, BodyBlock& block, const std::uint32_t* lane_of,
+               BoxNode* nodes) noexcept;
 
 /// A hierarchy of boxes, eight a node. Its shape changes no answer.
 class BoxTree {
@@ -148,6 +157,10 @@ class BoxTree {
         node.high[c][lane % kLanes] = high[c][k];
       }
     }
+  }
+  /// As put(), of all bodies of a block, which get these poses.
+  bool put_poses(std::uint32_t first, BodyBlock& block, const Pose* poses) noexcept {
+    return ist::put_poses(poses, block, lane_of_.data() + first, nodes_.data());
   }
   SceneBox box_of(std::uint32_t body) const noexcept {
     const std::uint32_t lane = lane_of_[body];

@@ -78,23 +78,13 @@ bool Scene::set_pose(std::uint32_t number, const Pose& pose) noexcept {
 
 std::size_t Scene::set_poses(std::span<const std::uint32_t> numbers,
                              std::span<const Pose> poses) noexcept {
-  return impl_->set_all(numbers, poses,
-                        [&](std::uint32_t block, std::uint32_t k, std::span<const Pose> row) {
-                          BodyBlock& all = impl_->blocks[block];
-                          if (row.size() < kCount)
-                            for (const Pose& pose : row) all.set_pose(k++, pose);
-                          else  // (without a loop)
-                            for (std::uint32_t r = 0; r < kCount; ++r) all.set_pose(r, row[r]);
-                        });
+  return impl_->set_poses(numbers.first(std::min(numbers.size(), poses.size())), poses.data());
 }
 
 std::size_t Scene::set_motions(std::span<const std::uint32_t> numbers,
                                std::span<const Motion> motions) noexcept {
-  return impl_->set_all(numbers, motions,
-                        [&](std::uint32_t block, std::uint32_t k, std::span<const Motion> row) {
-                          for (const Motion& motion : row)
-                            impl_->bodies[kCount * block + k++].given.motion = motion;
-                        });
+  return impl_->set_motions(numbers.first(std::min(numbers.size(), motions.size())),
+                            motions.data());
 }
 
 std::size_t Scene::size() const noexcept { return impl_->index_of.size(); }

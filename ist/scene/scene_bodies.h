@@ -193,47 +193,58 @@ struct SceneBodies {
     put_waiting(true);
   }
 
-  /// Calls set(block, lane, values…) for the rows of existing bodies; returns their number.
-  template <class Values, class Set>
-  std::size_t set_all(std::span<const std::uint32_t> numbers, const Values& values,
-                      const Set& set) noexcept {
-    const std::size_t count = std::min(numbers.size(), values.size());
-    const bool at_once = 8 * count > index_of.size();
-    // Full blocks, while they are in the cache, but some later: a vector that is read as soon as
-    // its numbers are written one by one waits for them.
-    std::uint32_t full[16], ready = 0;
-    const auto put_full = [&] {
-      for (std::uint32_t b = 0; b < ready; ++b) put(full[b], (1u << kCount) - 1, at_once);
-      ready = 0;
-    };
+  /// Calls set(block, lane, index, count) for the rows of existing bodies; returns their number.
+  template <class Set>
+  std::size_t each_row(std::span<const std::uint32_t> numbers, const Set& set) noexcept {
     std::size_t done = 0;
     std::uint32_t at = 0;
-    for (std::size_t i = 0; i < count;) {
-      at = find(numbers[i], at);
-      if (at == kNone) {
-        ++i;
-        continue;
-      }
+    for (std::size_t i = 0; i < numbers.size();) {
       // In a row, as far as its block goes.
+      std::uint32_t row = kCount;
+      if (i + kCount > numbers.size() || at % kCount != 0 || at >= number_of.size() ||
+          !is_full(at, numbers.data() + i)) {
+        at = find(numbers[i], at);
+        if (at == kNone) {
+          ++i;
+          continue;
+        }
+        const std::size_t most = std::min<std::size_t>(kCount - at % kCount, numbers.size() - i);
+        for (row = 1; row < most && is_at(at + row, numbers[i + row]);) ++row;
+      }
       const std::uint32_t k = at % kCount;
-      const std::size_t most = std::min<std::size_t>(kCount - k, count - i);
-      std::uint32_t row = 1;
-      if (most == kCount && is_full(at, numbers.data() + i))
-        row = kCount;
-      else
-        while (row < most && is_at(at + row, numbers[i + row])) ++row;
-      set(at / kCount, k, values.subspan(i, row));
-      if (row == kCount)
-        full[ready++] = at / kCount;
-      else
-        wait(at / kCount, ((1u << row) - 1) << k);
-      if (ready == std::size(full)) put_full();
+      set(at / kCount, k, i, row);
       at += row;
       i += row;
       done += row;
     }
-    put_full();
+    return done;
+  }
+  std::size_t set_poses(std::span<const std::uint32_t> numbers, const Pose* poses) noexcept {
+    constexpr std::uint32_t kAll = (1u << kCount) - 1;
+    const bool at_once = 8 * numbers.size() > index_of.size();
+    const std::size_t done = each_row(
+        numbers, [&](std::uint32_t b, std::uint32_t k, std::size_t i, std::uint32_t count) {
+          const Lanes& all = lanes[b];
+          if (at_once && count == kCount && all.in_vectors == kAll &&
+              (all.moving == kAll || all.still == kAll) &&
+              (all.moving == kAll ? moving : still).put_poses(kCount * b, blocks[b], poses + i)) {
+            note_moved(b, kAll);
+            return;
+          }
+          for (std::uint32_t r = 0; r < count; ++r) blocks[b].set_pose(k + r, poses[i + r]);
+          wait(b, ((1u << count) - 1) << k);
+        });
     put_waiting(at_once);
+    return done;
+  }
+  std::size_t set_motions(std::span<const std::uint32_t> numbers, const Motion* motions) noexcept {
+    const std::size_t done = each_row(
+        numbers, [&](std::uint32_t b, std::uint32_t k, std::size_t i, std::uint32_t count) {
+          for (std::uint32_t r = 0; r < count; ++r)
+            bodies[kCount * b + k + r].given.motion = motions[i + r];
+          wait(b, ((1u << count) - 1) << k);
+        });
+    put_waiting(8 * numbers.size() > index_of.size());
     return done;
   }
 

@@ -375,11 +375,12 @@ class _Pairs:
         return tuple(one.name for one in self.objects(i))
 
 
-def _hits(pairs, only_first):
-    """(those that collide, or the first of them; whether each only touches)"""
+def _hits(pairs, only_first, tells_touching=False):
+    """(those that collide, or the first of them; whether each only touches, where that is asked)"""
     if len(pairs) == 0:
         return np.zeros(0, int), np.zeros(0, bool)
-    hits, touching, stopped, status = pairs.ask(ist._core._collisions, only_first=only_first)
+    hits, touching, stopped, status = pairs.ask(ist._core._collisions, only_first=only_first,
+                                                tells_touching=tells_touching)
     if stopped >= 0:
         _refuse_unanswered(pairs, [stopped], np.array([status]))
     return hits, touching
@@ -387,7 +388,7 @@ def _hits(pairs, only_first):
 
 def _collide(pairs, with_names, with_data):
     """(whether any collide, their names, their ContactData)"""
-    hits, touching = _hits(pairs, not (with_names or with_data))
+    hits, touching = _hits(pairs, not (with_names or with_data), with_data)
     names = [pairs.names(i) for i in hits.tolist()]
     if not with_data:
         return len(hits) > 0, names, []

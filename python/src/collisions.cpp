@@ -40,7 +40,8 @@ double nearness(const Row& row) {
 /// row and the status that stopped it, −1 and ok if none did.
 using Collisions = std::tuple<py::object, py::object, std::int64_t, std::uint32_t>;
 
-Collisions collisions(const GivenPair& pair, bool only_first) {
+/// `tells_touching`: else touching ones count as overlapping, where that is quicker.
+Collisions collisions(const GivenPair& pair, bool only_first, bool tells_touching) {
   const Rows rows = pair.rows();
   PenetrationSettings settings;
   settings.measure = Measure::exact;
@@ -52,9 +53,15 @@ Collisions collisions(const GivenPair& pair, bool only_first) {
     if (done) return;
     const Row row = rows.at(i);
     if (nearness(row) > 0) return;
-    const Penetration answer = penetration(row.a.placed(), row.b.placed(), settings, workspace);
-    status[i] = answer.status;
-    found[i] = answer.volume > 0 ? overlap : answer.touching ? touch : apart;
+    const PlacedSolid a = row.a.placed(), b = row.b.placed();
+    const YesNo quick = tells_touching ? YesNo::unknown : ist::overlap(a, b, workspace).answer;
+    if (quick == YesNo::unknown) {
+      const Penetration answer = penetration(a, b, settings, workspace);
+      status[i] = answer.status;
+      found[i] = answer.volume > 0 ? overlap : answer.touching ? touch : apart;
+    } else {
+      found[i] = quick == YesNo::yes ? overlap : apart;
+    }
     if (only_first) done = found[i] != apart || status[i] != QueryStatus::ok;
   });
   const auto stop = std::find_if(status.begin(), status.end(),
@@ -78,8 +85,10 @@ Collisions collisions(const GivenPair& pair, bool only_first) {
 void add_collisions(py::module_& module) {
   add_pair_query(
       module, "_collisions",
-      +[](const GivenPair& pair, bool only_first) { return collisions(pair, only_first); },
-      py::arg("only_first"));
+      +[](const GivenPair& pair, bool only_first, bool tells_touching) {
+        return collisions(pair, only_first, tells_touching);
+      },
+      py::arg("only_first"), py::arg("tells_touching"));
   add_pair_query(
       module, "_nearness", +[](const GivenPair& pair) {
         const Rows rows = pair.rows();

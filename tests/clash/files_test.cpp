@@ -96,6 +96,16 @@ TEST_F(ClashFiles, KindsNumbersAndExitCodes) {
             std::string::npos);
 }
 
+TEST_F(ClashFiles, APartInAnotherAndFlushWithItIsAsDeepAsItIsLong) {
+  const std::string twice =
+      "scale = " + std::to_string(2 / edge_) + "\npose = [1,0,0,0, 0.5,0.25,0]\n";
+  write("flush.toml", part("a", 0) + "[[part]]\nname = \"b\"\nmesh = \"cube.obj\"\n" + twice);
+  const Json pair = json("flush.toml", {}, 3)["pairs"][0];
+  EXPECT_NEAR(pair["volume"].get<double>(), 1, 1e-12);
+  EXPECT_NEAR(pair["depth"].get<double>(), 1, 1e-7);
+  EXPECT_NEAR(pair["direction"][0].get<double>(), 1, 1e-7);
+}
+
 TEST_F(ClashFiles, ToleranceDecidesWhatIsAClash) {
   write("two.toml", part("a", 0) + part("b", 0.75));
   const auto verdict = [&](const char* tolerance, int exit_code) {
@@ -139,6 +149,19 @@ TEST_F(ClashFiles, RulesLeavePairsOut) {
   EXPECT_EQ(with("[[group]]\nname = \"g\"\nparts = [\"a*\", \"b1\"]\n"
                  "[[ignore]]\na = \"g\"\nb = \"b2\"\n"),
             Words{});
+  // Brackets are letters as others, and a letter may have several bytes.
+  const std::string named =
+      part("p[1]a", 0) + part("p1a", 0.5) + part("q\u00e4", 5) + part("r", 5.5);
+  for (const auto& [rule, left] :
+       {std::pair("p[1]*", Words{"q\u00e4 r overlapping"}),
+        std::pair("*[?]a", Words{"q\u00e4 r overlapping"}),
+        std::pair("q?", Words{"p[1]a p1a overlapping"}),
+        std::pair("q??", Words{"p[1]a p1a overlapping", "q\u00e4 r overlapping"}),
+        std::pair("p1*", Words{"q\u00e4 r overlapping"}),
+        std::pair("*1*b", Words{"p[1]a p1a overlapping", "q\u00e4 r overlapping"})}) {
+    write("named.toml", named + "[[ignore]]\na = '" + rule + "'\n");
+    EXPECT_EQ(pairs(json("named.toml")), left) << rule;
+  }
   write("all.toml", all);
   write("apart.toml", "[[ignore]]\na = \"a1\"\nb = \"*\"\n");
   EXPECT_EQ(pairs(json("all.toml", {"--rules", "apart.toml"})).size(), 3u);
@@ -316,6 +339,14 @@ TEST_F(ClashFiles, NodesOfASceneAreParts) {
   // The child is [0.25, 1.25] turned: x from 0.75 - 0.5 · (y + 1 - …), y from 5 + 0.5 · (x - 8.5).
   EXPECT_NEAR(report["pairs"][1]["volume"].get<double>(), 0.25 * 0.25 * 1, 1e-6);
   EXPECT_NEAR(report["pairs"][2]["volume"].get<double>(), 0.5 * 0.25 * 1, 1e-7);
+  // Each has a name of its own, whatever the file calls them.
+  write("alike.gltf", scene(R"([
+    {"name": "bolt", "mesh": 0}, {"name": "bolt", "mesh": 0, "translation": [10, 0, 0]},
+    {"name": "bolt#2", "mesh": 0, "translation": [20, 0, 0]},
+    {"name": "", "mesh": 0, "translation": [20.5, 0, 0]}, {"mesh": 0, "translation": [10.5, 0, 0]}])",
+                            folder_));
+  EXPECT_EQ(pairs(json("alike.gltf", {}, 3)),
+            (Words{"bolt#2 node 4 overlapping", "bolt#2#2 node 3 overlapping"}));
   for (const std::string bad :
        {"[{\"mesh\": 3}]", "[{\"mesh\": 0, \"scale\": [1, 0]}]", "[{}]", "7",
         "[{\"mesh\": 0, "
@@ -431,6 +462,13 @@ TEST_F(ClashFiles, RobotsStandWhereTheirJointsAre) {
   EXPECT_EQ(pairs(turned), Words{"world upper overlapping"});
   EXPECT_NE(turned["notes"].dump().find("1 round shape is a"), std::string::npos);
 
+  // What no part is, is told.
+  write("floor.xml",
+        "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1'/>"
+        "<geom type='plane' size='1 1 1' contype='0' conaffinity='0'/>"
+        "<body><geom type='box' size='1 1 1'/></body></worldbody></mujoco>");
+  EXPECT_EQ(json("floor.xml", {}, 0)["notes"],
+            Json({"left out, because planes and height fields are no solids: floor"}));
   write("egg.xml",
         "<mujoco><worldbody><geom type='box' pos='0 0 -5' size='5 5 5'/><body name='egg'>"
         "<freejoint/><geom type='ellipsoid' size='.1 .2 .3' euler='90 0 0'/></body></worldbody>"

@@ -357,7 +357,8 @@ TEST(Scene, BoxesOfAllSizesMeetWhereTheirNumbersSay) {
     scene.set_rule(0, 0, rule);
     std::map<std::uint32_t, SceneBody> bodies;
     const auto body = [&](std::uint32_t number) {
-      SceneBody out = block_at(number, 0, pile.below(3) != 0);
+      // All bodies move, and their blocks are placed at once, or not all do.
+      SceneBody out = block_at(number, 0, seed % 2 == 0 || pile.below(3) != 0);
       // A floor, and bodies 1e4 times as small; in a corner, or on a lattice.
       const double size = number == 0 ? 10 : std::exp2(pile.uniform(-10, seed % 2 == 0 ? 0 : -3));
       out.solid = PlacedSolid(block().view(), pile.pose(), size);
@@ -383,7 +384,7 @@ TEST(Scene, BoxesOfAllSizesMeetWhereTheirNumbersSay) {
         }
       EXPECT_EQ(found, wanted);
       met += wanted.size();
-      // All move in a row, or some one by one, some of which are other bodies then.
+      // All move in a row, some of them twice, or some one by one, some of which are other bodies.
       std::vector<std::uint32_t> numbers;
       std::vector<Pose> poses;
       for (std::uint32_t i = 0; i < count; ++i) {
@@ -394,8 +395,15 @@ TEST(Scene, BoxesOfAllSizesMeetWhereTheirNumbersSay) {
         }
         numbers.push_back(i);
         poses.push_back(pile.pose());
-        std::get<PlacedAsset>(bodies[i].solid.placed).pose = poses.back();
       }
+      if (step == 2)
+        for (const std::uint32_t first : {3u, 8u, 16u, 8u})
+          for (std::uint32_t i = first; i < first + 8; ++i) {
+            numbers.push_back(i);
+            poses.push_back(pile.pose());
+          }
+      for (std::size_t k = 0; k < numbers.size(); ++k)
+        std::get<PlacedAsset>(bodies[numbers[k]].solid.placed).pose = poses[k];
       EXPECT_EQ(scene.set_poses(numbers, poses), numbers.size());
     }
   }

@@ -18,7 +18,7 @@ TEST(SceneBoxes, OfEightAreThoseOfEach) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> uniform(-1, 1);
   const auto below = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
-  std::size_t placed = 0, refused = 0;
+  std::size_t placed = 0, refused = 0, put = 0;
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
@@ -65,12 +65,29 @@ TEST(SceneBoxes, OfEightAreThoseOfEach) {
           ASSERT_EQ(std::memcmp(&boxes.high[c][k], &high[c], sizeof(float)), 0);
         }
       }
+      // The same poses as they come, and where their boxes go.
+      Pose poses[BodyBlock::kCount];
+      BodyBlock other = block;
+      std::uint32_t lane_of[BodyBlock::kCount];
+      for (std::uint32_t k = 0; k < BodyBlock::kCount; ++k) {
+        poses[k] = block.pose(k);
+        other.set_pose(k, {});
+        lane_of[k] = (11 * k + static_cast<std::uint32_t>(round)) % 24;
+      }
+      BoxNode nodes[3];
+      ASSERT_EQ(put_poses(poses, other, lane_of, nodes), boxes.placed == 0xff);
+      ASSERT_EQ(std::memcmp(&other, &block, sizeof block), 0) << round;
+      if (boxes.placed != 0xff) continue;
+      ++put;
+      for (std::uint32_t k = 0; k < BodyBlock::kCount; ++k)
+        ASSERT_EQ(nodes[lane_of[k] / 8].box(lane_of[k] % 8), boxes.box(k)) << round << " " << k;
     }
   }
   hwy::SetSupportedTargetsForTest(0);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   EXPECT_GT(placed, 10'000u);
   EXPECT_GT(refused, 1'000u);
+  EXPECT_GT(put, 100u);
 }
 
 }  // namespace

@@ -345,7 +345,11 @@ class MjcfReader {
     const Attributes a = with_defaults(node, own_class);
     const bool visual = value(a, "contype", "1") == "0" && value(a, "conaffinity", "1") == "0";
     const std::string type = value(a, "type", a.contains("mesh") ? "mesh" : "sphere");
-    if (type == "plane" || type == "hfield") return;
+    if (type == "plane" || type == "hfield") {
+      if (!visual)
+        robot_.endless.push_back(value(a, "name", type + " of " + robot_.links[link].name));
+      return;
+    }
     PlacedLinkShape placed;
     try {
       placed = shape_of(node, a, type);

@@ -101,6 +101,7 @@ struct RobotModel {
       joint_of;                    ///< of each link, the joint it is the child of; kNone: the root
   std::vector<std::size_t> order;  ///< links, parents before children
   std::vector<std::pair<std::size_t, std::size_t>> excluded;  ///< links that the file ignores
+  std::vector<std::string> endless;  ///< planes and height fields, which no link has
 };
 
 /// The index of the link or joint of that name; the number of items if there is none.

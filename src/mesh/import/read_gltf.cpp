@@ -281,7 +281,8 @@ class GltfScene {
       if (at == out.meshes.size())
         append_node(index, {Transform::Identity()}, out.meshes.emplace_back());
       const std::vector<Transform> places = world_places(index);
-      const std::string name = node.value("name", "node " + std::to_string(index));
+      const std::string given = node.value("name", std::string());
+      const std::string name = given.empty() ? "node " + std::to_string(index) : given;
       for (std::size_t i = 0; i < places.size(); ++i)
         out.parts.push_back(
             {places.size() > 1 ? name + "[" + std::to_string(i) + "]" : name, at, places[i]});
