@@ -93,6 +93,7 @@ struct PairAlgorithm::State {
   Meeting meeting;
   Places before;  // where the shapes were in the last step, if `has_before`
   Points points;
+  Spring spring;  // of the points
   ContactMemory memory;
   ContactForce pushed;
 };
@@ -130,6 +131,7 @@ void Contacts::configure(btDynamicsWorld& world) {
 
 void Contacts::updateAction(btCollisionWorld* world, btScalar step) {
   btBroadphasePairArray& pairs = world->getPairCache()->getOverlappingPairArray();
+  btDispatcher& dispatcher = *world->getDispatcher();
   const auto objects_of = [](const btBroadphasePair& pair) {
     return std::array{static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject),
                       static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject)};
@@ -138,6 +140,10 @@ void Contacts::updateAction(btCollisionWorld* world, btScalar step) {
   for (int i = 0; i < pairs.size(); ++i) {
     const auto& [first, second] = objects_of(pairs[i]);
     if (!std::isfinite(fast_motion(*first, *second))) continue;
+    // No algorithm: the dispatcher's callback lets them pass.
+    if (pairs[i].m_algorithm == nullptr || !dispatcher.needsCollision(first, second) ||
+        !dispatcher.needsResponse(first, second))
+      continue;
     for (const btCollisionObject* object : {first, second}) {
       if (object->getInternalType() == btCollisionObject::CO_FEATHERSTONE_LINK &&
           object->getCcdSquareMotionThreshold() > 0) {
@@ -158,7 +164,11 @@ void Contacts::updateAction(btCollisionWorld* world, btScalar step) {
       btRigidBody* const body = movable(*object);
       if (body == nullptr || !(lost > 0)) continue;
       body->setCenterOfMassTransform(moved_back(*body, lost));
-      body->setLinearVelocity(body->getLinearVelocity() - lost * body->getGravity());
+      // What gravity gave in that time, unless a contact has taken it.
+      const btVector3 fall = lost * body->getGravity() * body->getLinearFactor();
+      const btScalar given = std::min(body->getLinearVelocity().dot(fall), fall.length2());
+      if (given > 0)
+        body->setLinearVelocity(body->getLinearVelocity() - given / fall.length2() * fall);
     }
   }
 }
@@ -269,13 +279,14 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   }
   state_->before = {at_first, at_second};
   state_->has_before = true;
-  if (holds) {
-    state_->points.move(first, second, step);
+  const Spring spring = spring_of(state_->meeting, first, second, settings, step);
+  if (holds && spring.is_like(state_->spring)) {
+    state_->points.move(*a, *b, step);
   } else {
-    const Spring spring = spring_of(state_->meeting, first, second, settings, step);
     Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact, state_->apart);
     state_->points.fill(*a, *b, contact, spring, *m_dispatcher);
+    state_->spring = spring;
     state_->second_in_first = second_in_first;
     state_->still = std::max(motion_until_asked(contact, settings, spring), contact.clearance);
     state_->apart = state_->points.count() == 0;

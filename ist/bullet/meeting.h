@@ -82,6 +82,11 @@ struct Spring {
   double rebound = 0;     ///< of a closing speed that it may give back
   double step = 0;        ///< [s] the world's
 
+  /// Of the same settings and bodies, in steps that may differ.
+  bool is_like(const Spring& other) const {
+    return stiffness == other.stiffness && relaxation == other.relaxation &&
+           push_out == other.push_out;
+  }
   /// [force/u³] at that depth.
   double at(double depth) const { return stiffness * std::max(1.0, depth / linear); }
   /// [u/s] At which an implicit step parts bodies at rest that are so deep: the spring's speed, but

@@ -19,7 +19,7 @@ Eigen::Vector3d place_of(const ContactPatch& patch);
 class Points {
  public:
   /// To where the bodies have moved.
-  void move(const btCollisionObject& first, const btCollisionObject& second, double step);
+  void move(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b, double step);
   /// A contact's points, in place of those there are. Reports where a contact begins or ends.
   void fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
             const Contact& contact, const Spring& spring, btDispatcher& dispatcher);

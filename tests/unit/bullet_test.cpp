@@ -424,6 +424,53 @@ TEST(BulletMaterial, AShapeAndAPairMayHaveTheirOwn) {
               0.005, 5e-4);
 }
 
+/// A box at rest on a slope of 0.3 rad: how far it moves in a second after a change.
+double slide_after(const std::function<void(World&, btRigidBody&)>& change) {
+  World world;
+  world.contacts.configure(world.world);
+  const btQuaternion turn({0, 1, 0}, 0.3);
+  btRigidBody& slope = world.add(cube_of_side(4), 0, btTransform(turn));
+  slope.setFriction(1);
+  btRigidBody& box =
+      world.add(cube_of_side(0.2), 1, btTransform(turn, quatRotate(turn, {0, 0, 2.1})));
+  box.setFriction(1);
+  world.step(240);
+  const btVector3 before = box.getWorldTransform().getOrigin();
+  change(world, box);
+  world.step(240);
+  return (box.getWorldTransform().getOrigin() - before).length();
+}
+
+// Contacts that hold are not queried again: what an engine changes counts all the same.
+TEST(BulletMaterial, ChangesCountWhileABodyRests) {
+  EXPECT_LT(slide_after([](World&, btRigidBody&) {}), 1e-3);
+  const double free = 0.5 * 9.81 * std::sin(0.3);
+  EXPECT_NEAR(slide_after([](World&, btRigidBody& box) { box.setFriction(0); }), free, 0.02 * free);
+  World world;
+  world.add_ground();
+  btRigidBody& box = world.add(cube_of_side(0.2), 1, btVector3(0, 0, 0.1));
+  world.step(240);
+  world.contacts.settings.depth = 0.02;
+  world.step(240);
+  EXPECT_NEAR(box.getWorldTransform().getOrigin().z(), 0.1 - 0.02 * 0.2, 2e-4);
+}
+
+// As a conveyor's: for every point in every step, also where nothing moves.
+TEST(BulletEvents, AddedCallbackSetsEachPointInEachStep) {
+  started = 0;
+  gContactAddedCallback = [](btManifoldPoint&, const btCollisionObjectWrapper*, int, int,
+                             const btCollisionObjectWrapper*, int, int) { return ++started > 0; };
+  World world;
+  world.add_ground();
+  btRigidBody& box = world.add(cube_of_side(1), 1, btVector3(0, 0, 0.499));
+  box.setCollisionFlags(box.getCollisionFlags() | btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+  world.step(240);
+  started = 0;
+  world.step(240);
+  EXPECT_EQ(started, 4 * 240);
+  gContactAddedCallback = nullptr;
+}
+
 TEST(BulletThreads, PairsAreAnsweredOnManyAtOnce) {
   const auto heights = [](bool many) {
     World world;

@@ -157,7 +157,8 @@ class Contacts : public btActionInterface {
 /// Events are Bullet's: gContactStartedCallback when a pair begins to touch, gContactEndedCallback
 /// when it no longer does, both with its first manifold, and gContactProcessedCallback for every
 /// point in every step. A point persists as long as its patch keeps its id. gContactAddedCallback
-/// may change a point whenever it was computed.
+/// may change a point in every step; what it sets of the spring lasts until the point is computed
+/// again.
 class PairAlgorithm : public btActivatingCollisionAlgorithm {
  public:
   PairAlgorithm(const btCollisionAlgorithmConstructionInfo& info, const Contacts& contacts,
