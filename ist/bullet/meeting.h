@@ -29,11 +29,18 @@ class Meeting {
   void find(const btTransform& first, const btTransform& second, const Settings& settings,
             Contact& contact, bool likely_apart = false) const;
 
-  /// The share [0, 1] of a motion of two bodies at which their shapes collide, or get too deep in a
-  /// contact: see Contacts::updateAction(). `in_body`: the shapes, as children of these. 1 if no
+  /// The nearest points of shapes that are apart by no more than `most` [u].
+  Separation gap(const btTransform& first, const btTransform& second, const Settings& settings,
+                 double most) const;
+
+  /// The asset's spheres leave a layer uncovered that is thick for a partner of this size.
+  bool is_coarse() const;
+
+  /// How far two bodies get until their shapes collide, or get too deep in a contact: see
+  /// Contacts::updateAction(). `in_body`: the shapes, as children of these. All of the motion if no
   /// point moves by more than `threshold` [u] against the other body.
-  double share_until_impact(const Places& from, const Places& to, const Places& in_body,
-                            double threshold, const Settings& settings) const;
+  Passage passage(const Places& from, const Places& to, const Places& in_body, double threshold,
+                  const Settings& settings) const;
 
   /// [u] No point of one has moved by more than this against the other since the second was at
   /// `before` in the frame of the first.
