@@ -82,7 +82,7 @@ SceneResult run_impacts(const SceneOptions& options) {
     }
   }
   Run run(world, options);
-  run.go(options.seconds > 0 ? options.seconds : 0.6, [&] {
+  run.go(options.seconds > 0 ? options.seconds : 1.2, [&] {
     for (Fall& fall : falls) {
       const double z = fall.body->getCenterOfMassPosition().z(), mass = 1 / fall.body->getInvMass();
       const bool touches = world.contact_force(*fall.body).norm() > 0;
