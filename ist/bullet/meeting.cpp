@@ -161,6 +161,13 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
     const ContactPatches found = contact_patches(a, b, query, workspace(), room);
     contact.whole = found.penetration;
     contact.count = found.count;
+    if (contact.whole.status == QueryStatus::budget_exhausted) {
+      warn(
+          "A limit of Settings::query stopped a contact query: what it had found until then "
+          "pushes, "
+          "and bodies may sink in.",
+          world_);
+    }
   }
   if (std::isnan(contact.whole.volume)) {
     warn(

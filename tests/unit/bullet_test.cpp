@@ -47,6 +47,18 @@ TEST(BulletShapes, APlaceThatIsNoNumberIsSaid) {
   EXPECT_NE(warned[0].find("gave no answer"), std::string::npos) << warned[0];
 }
 
+// A query that its limit stops finds a part of the contact, and that is said.
+TEST(BulletShapes, AQueryThatIsStoppedIsSaid) {
+  const Listen listen;
+  World world;
+  world.contacts.settings.query.max_visits = 1;
+  world.add_ground();
+  world.add(cube_of_side(0.2), 1, btVector3(0, 0, 0.09));
+  world.step(10);
+  ASSERT_EQ(warned.size(), 1u);
+  EXPECT_NE(warned[0].find("stopped a contact query"), std::string::npos) << warned[0];
+}
+
 std::vector<btVector3> corners(double half) {
   std::vector<btVector3> points;
   for (int i = 0; i < 8; ++i) {
