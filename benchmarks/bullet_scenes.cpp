@@ -179,7 +179,7 @@ int main(int argc, char** argv) {
     SceneOptions of_run = options;
     of_run.full = !report.quick();
     Json rows = Json::array();
-    for (const Way way : {Way::solver, Way::hulls, Way::gimpact}) {
+    for (const Way way : {Way::solver, Way::own, Way::hulls, Way::gimpact}) {
       const unsigned times = !report.quick() ? 10 : way == Way::gimpact ? 1 : 4;
       for (const double hz : {60, 120, 240, 1000}) {
         of_run.hz = hz;

@@ -13,7 +13,7 @@ namespace {
 int usage() {
   std::fprintf(
       stderr,
-      "usage: bullet_scenes SCENE|all [--way solver|wrench|gimpact|hulls] [--hz F]\n"
+      "usage: bullet_scenes SCENE|all [--way solver|wrench|gimpact|hulls|own] [--hz F]\n"
       "         [--seconds S] [--full] [--meshes DIR] [--shared DIR] [--glb FILE] [--row]\n"
       "exits 3 where a truth does not hold. --row: one line of a table. Scenes:\n");
   for (const Scene& scene : scenes()) std::fprintf(stderr, "  %-8s %s\n", scene.name, scene.what);
@@ -75,6 +75,8 @@ int main(int argc, char** argv) try {
         options.way = Way::gimpact;
       else if (value == "hulls")
         options.way = Way::hulls;
+      else if (value == "own")
+        options.way = Way::own;
       else
         return usage();
     } else if (key == "--hz") {

@@ -71,6 +71,14 @@ Unsaid unsaid_motion(const btCollisionObject& object, const btTransform& before,
   return motion;
 }
 
+bool is_valid(const Settings& settings) {
+  const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
+  const auto from_0 = [](double x) { return x >= 0 && std::isfinite(x); };
+  return settings.patches > 0 && positive(settings.depth) && from_0(settings.damping) &&
+         from_0(settings.thickness) && from_0(settings.push_out) && from_0(settings.follow) &&
+         from_0(settings.law.stiffness);
+}
+
 /// [u] The motion during which points are moved along instead of queried again.
 double motion_until_asked(const Contact& contact, const Settings& settings, const Spring& spring) {
   // Corners with fixed areas bear three times the torque of a face that tilts on its springs.
@@ -93,6 +101,7 @@ struct PairAlgorithm::State {
   Meeting meeting;
   Places before;  // the shapes' places in the last step, if `has_before`
   Points points;
+  Spring spring;  // of the points
   ContactMemory memory;
   ContactForce pushed;
 };
@@ -101,7 +110,14 @@ Settings Contacts::settings_of(const btCollisionObject& first,
                                const btCollisionObject& second) const {
   Settings of = settings;
   if (of_pair) of_pair(first, second, of);
-  return of;
+  if (is_valid(of)) return of;
+  warn(
+      "Settings that are no numbers, negative, or of no patches or no depth: the default settings "
+      "are used.",
+      this);
+  Settings defaults;
+  defaults.response = of.response;
+  return defaults;
 }
 
 void Contacts::register_with(btCollisionDispatcher& dispatcher) {
@@ -130,14 +146,21 @@ void Contacts::configure(btDynamicsWorld& world) {
 
 void Contacts::updateAction(btCollisionWorld* world, btScalar step) {
   btBroadphasePairArray& pairs = world->getPairCache()->getOverlappingPairArray();
+  btDispatcher& dispatcher = *world->getDispatcher();
   const auto objects_of = [](const btBroadphasePair& pair) {
     return std::array{static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject),
                       static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject)};
   };
+  constexpr btScalar kJammed = 16;
+  jammed_.clear();
   // All impacts are found before anything is moved, so the order of pairs does not matter.
   for (int i = 0; i < pairs.size(); ++i) {
     const auto& [first, second] = objects_of(pairs[i]);
     if (!std::isfinite(fast_motion(*first, *second))) continue;
+    // No algorithm: the dispatcher's callback lets them pass.
+    if (pairs[i].m_algorithm == nullptr || !dispatcher.needsCollision(first, second) ||
+        !dispatcher.needsResponse(first, second))
+      continue;
     for (const btCollisionObject* object : {first, second}) {
       if (object->getInternalType() == btCollisionObject::CO_FEATHERSTONE_LINK &&
           object->getCcdSquareMotionThreshold() > 0) {
@@ -147,45 +170,56 @@ void Contacts::updateAction(btCollisionWorld* world, btScalar step) {
             this);
       }
     }
-    const auto share = static_cast<btScalar>(share_of(pairs[i].m_algorithm, *first, *second, step));
-    for (btCollisionObject* object : {first, second})
-      object->setHitFraction(std::min(share, object->getHitFraction()));
+    const Passage passage = passage_of(pairs[i].m_algorithm, *first, *second, step);
+    for (btCollisionObject* object : {first, second}) {
+      object->setHitFraction(
+          std::min(static_cast<btScalar>(passage.share), object->getHitFraction()));
+      if (passage.touched && kJammed * passage.share < 1) jammed_.push_back(object);
+    }
   }
   for (int i = 0; i < pairs.size(); ++i) {
     for (btCollisionObject* object : objects_of(pairs[i])) {
-      const btScalar lost = step * (1 - object->getHitFraction());
+      const btScalar share = object->getHitFraction(), lost = step * (1 - share);
       object->setHitFraction(1);
       btRigidBody* const body = movable(*object);
       if (body == nullptr || !(lost > 0)) continue;
       body->setCenterOfMassTransform(moved_back(*body, lost));
-      body->setLinearVelocity(body->getLinearVelocity() - lost * body->getGravity());
+      // What gravity gave in that time, unless a contact has taken it.
+      const btVector3 fall = lost * body->getGravity() * body->getLinearFactor();
+      const btScalar given = std::min(body->getLinearVelocity().dot(fall), fall.length2());
+      if (given > 0)
+        body->setLinearVelocity(body->getLinearVelocity() - given / fall.length2() * fall);
+      if (std::find(jammed_.begin(), jammed_.end(), object) == jammed_.end()) continue;
+      const btScalar kept = std::max(btScalar(0.5), kJammed * share);
+      body->setLinearVelocity(kept * body->getLinearVelocity());
+      body->setAngularVelocity(kept * body->getAngularVelocity());
     }
   }
 }
 
-double Contacts::share_of(const btCollisionAlgorithm* algorithm, const btCollisionObject& first,
-                          const btCollisionObject& second, btScalar step) const {
+Passage Contacts::passage_of(const btCollisionAlgorithm* algorithm, const btCollisionObject& first,
+                             const btCollisionObject& second, btScalar step) const {
   const Places from = {moved_back(first, step), moved_back(second, step)};
   const Places to = {first.getWorldTransform(), second.getWorldTransform()};
   if (const auto* const pair = dynamic_cast<const PairAlgorithm*>(algorithm))
-    return pair->share_until_impact(first, second, from, to);
+    return pair->passage(first, second, from, to);
   // Bullet does not show the algorithms of a compound's children.
   const btCollisionShape &shape = *first.getCollisionShape(), &other = *second.getCollisionShape();
-  double share = 1;
-  if (!shape.isCompound() && !other.isCompound()) return share;
+  Passage least;
+  if (!shape.isCompound() && !other.isCompound()) return least;
   const double threshold = fast_motion(first, second);
   const Settings settings = settings_of(first, second);
   for_each_part(shape, btTransform::getIdentity(),
                 [&](const btCollisionShape& part, const btTransform& in_body) {
                   for_each_part(other, btTransform::getIdentity(),
                                 [&](const btCollisionShape& met, const btTransform& in_other) {
-                                  share = std::min(
-                                      share, Meeting(part, met, this)
-                                                 .share_until_impact(from, to, {in_body, in_other},
-                                                                     threshold, settings));
+                                  const Passage one = Meeting(part, met, this)
+                                                          .passage(from, to, {in_body, in_other},
+                                                                   threshold, settings);
+                                  if (one.share < least.share) least = one;
                                 });
                 });
-  return share;
+  return least;
 }
 
 btCollisionAlgorithm* Contacts::CreateFunc::CreateCollisionAlgorithm(
@@ -202,6 +236,13 @@ btCollisionAlgorithm* Contacts::CreateFunc::CreateCollisionAlgorithm(
     warn((std::string(first.getName()) + " and " + second.getName() +
           " do not meet: they pass through each other. docs/engines.md lists what an asset meets, "
           "and what to use in place of the rest.")
+             .c_str(),
+         contacts);
+  }
+  if (meeting.is_coarse()) {
+    warn((std::string((dynamic_cast<const Shape*>(&first) != nullptr ? second : first).getName()) +
+          " is small against what the spheres of an asset leave uncovered, and sinks in until it "
+          "meets them: bake the asset with more spheres, or the small body as an asset too.")
              .c_str(),
          contacts);
   }
@@ -249,6 +290,13 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
           to_bullet(Eigen::Vector3d(place_of(patch) + 0.5 * patch.depth * normal)),
           static_cast<btScalar>(-patch.depth));
     }
+    const double most = result->m_closestPointDistanceThreshold;
+    if (contact.count == 0 && most > 0) {
+      const Separation gap = state_->meeting.gap(at_first, at_second, settings, most);
+      if (gap.distance > 0 && gap.distance < most)
+        result->addContactPoint(to_bullet(Eigen::Vector3d(-gap.normal)), to_bullet(gap.point_b),
+                                static_cast<btScalar>(gap.distance));
+    }
     result->setPersistentManifold(nullptr);
     return;
   }
@@ -269,13 +317,14 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   }
   state_->before = {at_first, at_second};
   state_->has_before = true;
-  if (holds) {
-    state_->points.move(first, second, step);
+  const Spring spring = spring_of(state_->meeting, first, second, settings, step);
+  if (holds && spring.is_like(state_->spring)) {
+    state_->points.move(*a, *b, step);
   } else {
-    const Spring spring = spring_of(state_->meeting, first, second, settings, step);
     Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact, state_->apart);
     state_->points.fill(*a, *b, contact, spring, *m_dispatcher);
+    state_->spring = spring;
     state_->second_in_first = second_in_first;
     state_->still = std::max(motion_until_asked(contact, settings, spring), contact.clearance);
     state_->apart = state_->points.count() == 0;
@@ -290,12 +339,10 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   }
 }
 
-double PairAlgorithm::share_until_impact(const btCollisionObject& first,
-                                         const btCollisionObject& second, const Places& from,
-                                         const Places& to) const {
-  return state_->meeting.share_until_impact(
-      from, to, {btTransform::getIdentity(), btTransform::getIdentity()},
-      fast_motion(first, second), contacts_.settings_of(first, second));
+Passage PairAlgorithm::passage(const btCollisionObject& first, const btCollisionObject& second,
+                               const Places& from, const Places& to) const {
+  return state_->meeting.passage(from, to, {btTransform::getIdentity(), btTransform::getIdentity()},
+                                 fast_motion(first, second), contacts_.settings_of(first, second));
 }
 
 void PairAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {

@@ -162,6 +162,13 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
     const ContactPatches found = contact_patches(a, b, query, workspace(), room);
     contact.whole = found.penetration;
     contact.count = found.count;
+    if (contact.whole.status == QueryStatus::budget_exhausted) {
+      warn(
+          "A limit of Settings::query stopped a contact query: what it had found until then "
+          "pushes, "
+          "and bodies may sink in.",
+          world_);
+    }
   }
   if (std::isnan(contact.whole.volume)) {
     warn(
@@ -214,6 +221,23 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   contact.count = *corners;
   contact.flat = true;
   contact.clearance = 0;
+}
+
+Separation Meeting::gap(const btTransform& first, const btTransform& second,
+                        const Settings& settings, double most) const {
+  const auto& [a, b] = placed({first, second}, {first, second}, settings);
+  return separation(a, b, {.max_distance = most}, workspace());
+}
+
+bool Meeting::is_coarse() const {
+  constexpr double kThick = 0.05;  // of the partner's size
+  if (!partner_ || !partner_->shape().isConvex()) return false;
+  const Shape& asset = first_ != nullptr ? *first_ : *second_;
+  btVector3 lower, upper;
+  partner_->shape().getAabb(btTransform::getIdentity(), lower, upper);
+  const Eigen::Vector3d sides = to_eigen(upper) - to_eigen(lower);
+  const double layer = (1 - asset.tree().coverage()) * std::cbrt(asset.volume()) / 6;  // a cube's
+  return layer > kThick * std::cbrt(sides.prod());
 }
 
 bool Meeting::find_way_out(const Solids& solids, const Places& at, Contact& contact) const {
@@ -275,21 +299,21 @@ TimeOfImpact Meeting::impact(const Places& from, const Places& to, const Places&
   return time_of_impact(a, b, {motion(first_, 0), motion(second_, 1)}, limit, workspace());
 }
 
-double Meeting::share_until_impact(const Places& from, const Places& to, const Places& in_body,
-                                   double threshold, const Settings& settings) const {
+Passage Meeting::passage(const Places& from, const Places& to, const Places& in_body,
+                         double threshold, const Settings& settings) const {
   constexpr double kDepth = 0.25;  // of the threshold
   constexpr int kLooks = 24;
-  if (!is_met() || settings.response != Settings::Response::solver) return 1;
+  if (!is_met() || settings.response != Settings::Response::solver) return {};
   const auto between = [&](const Places& at) {
     const Places shapes = at * in_body;
     return shapes[0].inverseTimes(shapes[1]);
   };
   const double motion = largest_motion(between(from), between(to));
-  if (!(motion > threshold)) return 1;
+  if (!(motion > threshold)) return {};
   const TimeOfImpact found = impact(from, to, in_body, settings);
-  if (found.kind == ImpactKind::no_impact && found.status == QueryStatus::ok) return 1;
-  const double stride = threshold / motion;
-  if (found.kind != ImpactKind::overlapping) return std::min(1.0, found.time + kDepth * stride);
+  if (found.kind == ImpactKind::no_impact && found.status == QueryStatus::ok) return {};
+  if (found.kind != ImpactKind::overlapping)
+    return {std::min(1.0, found.time + kDepth * threshold / motion)};
 
   // In contact, their mean depth is most informative if they slide or turn, like a nut on its
   // thread.
@@ -308,6 +332,7 @@ double Meeting::share_until_impact(const Places& from, const Places& to, const P
   };
   // Bodies that are already deeper are left to their springs: if nothing could get deeper, a heap
   // of bodies would stand still and keep its speeds.
+  const double stride = std::max(threshold / motion, 1.0 / kLooks);
   const double deep = kDepth * threshold, begins = depth_after(0);
   const double most = begins < deep ? deep : begins + deep;
   const double least = stride / 8;  // else two bodies that turn into each other would stop forever
@@ -320,7 +345,7 @@ double Meeting::share_until_impact(const Places& from, const Places& to, const P
       share = there;
     }
   }
-  return std::max(share, std::min(1.0, least));
+  return {std::max(share, std::min(1.0, least)), true};
 }
 
 double mean_depth(const Contact& contact) {

@@ -29,11 +29,18 @@ class Meeting {
   void find(const btTransform& first, const btTransform& second, const Settings& settings,
             Contact& contact, bool likely_apart = false) const;
 
-  /// The fraction [0, 1] of a motion of two bodies at which their shapes collide, or get too deep
-  /// in a contact: see Contacts::updateAction(). `in_body`: the shapes, as children of these. 1 if
-  /// no point moves by more than `threshold` [u] relative to the other body.
-  double share_until_impact(const Places& from, const Places& to, const Places& in_body,
-                            double threshold, const Settings& settings) const;
+  /// The nearest points of shapes that are apart by no more than `most` [u].
+  Separation gap(const btTransform& first, const btTransform& second, const Settings& settings,
+                 double most) const;
+
+  /// True if the asset's spheres leave a layer uncovered that is thick for a partner of this size.
+  bool is_coarse() const;
+
+  /// How far two bodies get until their shapes collide, or get too deep in a contact: see
+  /// Contacts::updateAction(). `in_body`: the shapes, as children of these. All of the motion if no
+  /// point moves by more than `threshold` [u] relative to the other body.
+  Passage passage(const Places& from, const Places& to, const Places& in_body, double threshold,
+                  const Settings& settings) const;
 
   /// [u] Bound on the motion of any point of one relative to the other since the second was at
   /// `before` in the frame of the first.
@@ -81,6 +88,11 @@ struct Spring {
   double rebound = 0;     ///< of a closing speed that it may return
   double step = 0;        ///< [s] the world's
 
+  /// Of the same settings and bodies, in steps that may differ.
+  bool is_like(const Spring& other) const {
+    return stiffness == other.stiffness && relaxation == other.relaxation &&
+           push_out == other.push_out;
+  }
   /// [force/u³] at that depth.
   double at(double depth) const { return stiffness * std::max(1.0, depth / linear); }
   /// [u/s] The speed at which an implicit step separates bodies at rest at that depth: the spring's

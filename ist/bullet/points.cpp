@@ -88,6 +88,35 @@ void stop_next_place(btManifoldPoint& point, const btCollisionObject& first,
   point.m_contactMotion1 = -size;
 }
 
+/// A point's material, combined from two bodies'; an engine may change these in any step.
+struct Material {
+  Material(const btCollisionObject& first, const btCollisionObject& second)
+      : friction(gCalculateCombinedFrictionCallback(&first, &second)),
+        rolling(gCalculateCombinedRollingFrictionCallback(&first, &second)),
+        spinning(gCalculateCombinedSpinningFrictionCallback(&first, &second)),
+        restitution(gCalculateCombinedRestitutionCallback(&first, &second)) {}
+
+  void set(btManifoldPoint& point) const {
+    point.m_combinedFriction = friction;
+    point.m_combinedRollingFriction = rolling;
+    point.m_combinedSpinningFriction = spinning;
+    point.m_combinedRestitution = restitution;
+  }
+
+  btScalar friction, rolling, spinning, restitution;
+};
+
+void tell_owner(btManifoldPoint& point, const btCollisionObjectWrapper& a,
+                const btCollisionObjectWrapper& b) {
+  const int flags =
+      a.getCollisionObject()->getCollisionFlags() | b.getCollisionObject()->getCollisionFlags();
+  if (gContactAddedCallback == nullptr ||
+      (flags & btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK) == 0)
+    return;
+  gContactAddedCallback(point, &a, point.m_partId0, point.m_index0, &b, point.m_partId1,
+                        point.m_index1);
+}
+
 /// Points that are being replaced.
 struct OldPoints {
   using Frictions = std::array<btVector3, Settings::kPatches>;
@@ -176,7 +205,10 @@ void Points::release(btDispatcher& dispatcher) {
   }
 }
 
-void Points::move(const btCollisionObject& first, const btCollisionObject& second, double step) {
+void Points::move(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
+                  double step) {
+  const btCollisionObject &first = *a.getCollisionObject(), &second = *b.getCollisionObject();
+  const Material material(first, second);
   const btTransform& to_world_first = first.getWorldTransform();
   const btTransform& to_world_second = second.getWorldTransform();
   std::size_t at = 0;
@@ -188,8 +220,10 @@ void Points::move(const btCollisionObject& first, const btCollisionObject& secon
       point.m_normalWorldOnB = to_world_first.getBasis() * normals_[at];
       point.m_distance1 =
           (point.m_positionWorldOnA - point.m_positionWorldOnB).dot(point.m_normalWorldOnB);
+      material.set(point);
       forget_impact(point, step);
       stop_next_place(point, first, second, frictions_[at++]);
+      tell_owner(point, a, b);
       ++point.m_lifeTime;
     }
   }
@@ -243,6 +277,7 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
   OldPoints old(manifolds, frictions_);
   const bool touched = old.count > 0;
   const Eigen::Vector3d pushed = together(first, second, contact, spring);
+  const Material material(first, second);
 
   // Bullet's normal pushes the manifold's first body.
   const btTransform to_first = first.getWorldTransform().inverse();
@@ -260,10 +295,7 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
     btManifoldPoint point(to_first * on_first, to_second * on_second, normal, -depth);
     point.m_positionWorldOnA = on_first;
     point.m_positionWorldOnB = on_second;
-    point.m_combinedFriction = gCalculateCombinedFrictionCallback(&first, &second);
-    point.m_combinedRollingFriction = gCalculateCombinedRollingFrictionCallback(&first, &second);
-    point.m_combinedSpinningFriction = gCalculateCombinedSpinningFrictionCallback(&first, &second);
-    point.m_combinedRestitution = gCalculateCombinedRestitutionCallback(&first, &second);
+    material.set(point);
     const double approach =
         normal.dot(velocity_of(second, on_second) - velocity_of(first, on_first));
     if (point.m_combinedRestitution > 0 && approach > spring.slow) {
@@ -287,12 +319,7 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
     btManifoldPoint& point = points[i];
     if (!named[i]) old.give_impulse_to(point, frictions_[i], spring.step);
     stop_next_place(point, first, second, frictions_[i]);
-    if (gContactAddedCallback != nullptr &&
-        ((first.getCollisionFlags() | second.getCollisionFlags()) &
-         btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK)) {
-      gContactAddedCallback(point, &a, point.m_partId0, point.m_index0, &b, point.m_partId1,
-                            point.m_index1);
-    }
+    tell_owner(point, a, b);
     normals_[i] = to_first.getBasis() * point.m_normalWorldOnB;
     const std::size_t at = i / kPointsOfAManifold;
     if (at == manifolds.size()) manifolds.push_back(dispatcher.getNewManifold(&first, &second));

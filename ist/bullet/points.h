@@ -19,7 +19,7 @@ Eigen::Vector3d place_of(const ContactPatch& patch);
 class Points {
  public:
   /// Moves the points with the bodies.
-  void move(const btCollisionObject& first, const btCollisionObject& second, double step);
+  void move(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b, double step);
   /// Replaces the points by those of a contact. Reports the beginning or end of a contact.
   void fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
             const Contact& contact, const Spring& spring, btDispatcher& dispatcher);

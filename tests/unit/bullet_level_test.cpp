@@ -313,5 +313,93 @@ TEST(BulletImpact, TheShareOfAMotionIsTold) {
   EXPECT_EQ(share(0, 1), 1);                      // not asked for
 }
 
+// Bullet's own sweeps pass what does not push, and what its filters let pass.
+TEST(BulletImpact, FastBodiesPassWhatDoesNotPush) {
+  for (const bool compound : {false, true}) {
+    for (const int kind : {0, 1, 2}) {
+      SCOPED_TRACE(std::to_string(kind) + (compound ? ", a compound" : ", a cube"));
+      World world;
+      world.world.setGravity({0, 0, 0});
+      world.world.addAction(&world.contacts);
+      btRigidBody& wall =
+          world.add(std::make_unique<btBoxShape>(btVector3(0.1f, 1, 1)), 0, btVector3(1, 0, 0));
+      btRigidBody& box = world.add(fast_shape(0.02, compound), 1, btVector3(0, 0, 0));
+      box.setCcdMotionThreshold(0.004f);
+      box.setLinearVelocity({30, 0, 0});
+      btRigidBody& silent = kind == 0 ? wall : box;
+      if (kind < 2) {
+        silent.setCollisionFlags(silent.getCollisionFlags() |
+                                 btCollisionObject::CF_NO_CONTACT_RESPONSE);
+      } else {
+        box.setIgnoreCollisionCheck(&wall, true);
+      }
+      world.step(6, {}, 60);
+      EXPECT_NEAR(box.getWorldTransform().getOrigin().x(), 3, 1e-9);
+    }
+  }
+}
+
+// A thin plate that a contact stops in every step turned on in slow motion: half a second after a
+// fall of 10 m it had half of its energy.
+TEST(BulletImpact, APlateThatIsStoppedInContactLosesItsEnergy) {
+  const Asset plate = baked(box_mesh({-0.05, -0.05, -0.005}, {0.05, 0.05, 0.005}), "plate", 500);
+  for (int turn = 0; turn < 12; ++turn) {
+    World world;
+    world.contacts.configure(world.world);
+    world.world.addAction(&world.contacts);
+    world.add_ground();
+    const btQuaternion way(btVector3(1, btScalar(0.3 * turn), -1).normalized(),
+                           btScalar(0.4 * turn));
+    btRigidBody& body = world.add(std::make_unique<bullet::Shape>(plate.view()), 0.1,
+                                  btTransform(way, {0, 0, 0.08f}));
+    body.setCcdMotionThreshold(0.005f);
+    body.setLinearVelocity({0, 0, -14});
+    world.step(24, {}, 60);
+    const double speed = std::max<double>(body.getLinearVelocity().length(),
+                                          0.05 * body.getAngularVelocity().length());
+    EXPECT_LT(speed, 2) << turn;
+    EXPECT_GT(body.getWorldTransform().getOrigin().z(), 0);
+  }
+}
+
+// However small the threshold: a step has two dozen looks, and no body slides slower for it.
+TEST(BulletImpact, ABodyThatSlidesKeepsItsSpeed) {
+  World world;
+  world.contacts.configure(world.world);
+  world.world.addAction(&world.contacts);
+  world.add_ground();
+  btRigidBody& box = world.add(cube_of_side(kSide), 1, btVector3(0, 0, 0.1f));
+  box.setFriction(0);
+  world.step(30, {}, 60);
+  box.setCcdMotionThreshold(0.002f);
+  box.setLinearVelocity({10, 0, 0});
+  world.step(30, {}, 60);
+  EXPECT_NEAR(box.getWorldTransform().getOrigin().x(), 5, 0.01);
+}
+
+// A body that is stopped loses what gravity gave it in the time that is lost, and no more: not what
+// the floor bears, and nothing along an axis on which it may not move.
+TEST(BulletImpact, ABodyThatIsStoppedIsNotLifted) {
+  for (const bool floor : {false, true}) {
+    World world;
+    world.contacts.configure(world.world);
+    world.world.addAction(&world.contacts);
+    if (floor) world.add_ground();
+    world.add(std::make_unique<btBoxShape>(btVector3(0.05f, 1, 1)), 0, btVector3(2, 0, 0));
+    btRigidBody& box = world.add(cube_of_side(kSide), 1, btVector3(0, 0, 0.1f));
+    box.setFriction(0);
+    box.setAngularFactor(0);
+    if (!floor) box.setLinearFactor({1, 1, 0});
+    world.step(60, {}, 60);
+    box.setCcdMotionThreshold(0.02f);
+    box.setLinearVelocity({10, 0, 0});
+    double fastest = 0;
+    world.step(
+        60, [&] { fastest = std::max<double>(fastest, box.getLinearVelocity().z()); }, 60);
+    EXPECT_LT(fastest, 1e-3) << floor;
+    EXPECT_LT(box.getWorldTransform().getOrigin().x(), 1.86);
+  }
+}
+
 }  // namespace
 }  // namespace ist::testing

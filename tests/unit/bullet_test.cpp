@@ -47,6 +47,18 @@ TEST(BulletShapes, APlaceThatIsNoNumberIsSaid) {
   EXPECT_NE(warned[0].find("gave no answer"), std::string::npos) << warned[0];
 }
 
+// A query that its limit stops finds a part of the contact, and that is said.
+TEST(BulletShapes, AQueryThatIsStoppedIsSaid) {
+  const Listen listen;
+  World world;
+  world.contacts.settings.query.max_visits = 1;
+  world.add_ground();
+  world.add(cube_of_side(0.2), 1, btVector3(0, 0, 0.09));
+  world.step(10);
+  ASSERT_EQ(warned.size(), 1u);
+  EXPECT_NE(warned[0].find("stopped a contact query"), std::string::npos) << warned[0];
+}
+
 std::vector<btVector3> corners(double half) {
   std::vector<btVector3> points;
   for (int i = 0; i < 8; ++i) {
@@ -339,6 +351,71 @@ TEST(BulletEvents, ContactTestGetsThePoints) {
   EXPECT_GE(count.points, 4);
 }
 
+// Bullet's convex shapes tell the nearest points too.
+TEST(BulletEvents, PairTestTellsTheGapUpToItsThreshold) {
+  struct Nearest : btCollisionWorld::ContactResultCallback {
+    int points = 0;
+    btVector3 on_a, on_b;
+    btScalar addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper*, int, int,
+                             const btCollisionObjectWrapper*, int, int) override {
+      ++points;
+      on_a = point.getPositionWorldOnA(), on_b = point.getPositionWorldOnB();
+      return 0;
+    }
+  };
+  World world;
+  btRigidBody& a = world.add(cube_of_side(1), 1, btVector3(0, 0, 0));
+  btRigidBody& b = world.add(cube_of_side(1), 1, btVector3(1.05f, 0.1f, 0.2f));
+  for (const bool turned : {false, true}) {
+    for (const double most : {0.0, 0.04, 0.1}) {
+      Nearest nearest;
+      nearest.m_closestDistanceThreshold = btScalar(most);
+      world.world.contactPairTest(turned ? &b : &a, turned ? &a : &b, nearest);
+      ASSERT_EQ(nearest.points, most > 0.05 ? 1 : 0) << most;
+      if (nearest.points == 0) continue;
+      EXPECT_NEAR((turned ? nearest.on_b : nearest.on_a).x(), 0.5, 1e-6);
+      EXPECT_NEAR((turned ? nearest.on_a : nearest.on_b).x(), 0.55, 1e-6);
+    }
+  }
+}
+
+// What cannot be asked is said, and the defaults hold the body.
+TEST(BulletMaterial, SettingsThatAreNoneAreSaid) {
+  using bullet::Settings;
+  const std::vector<std::function<void(Settings&)>> wrong = {
+      [](Settings& s) { s.patches = 0; },         [](Settings& s) { s.depth = 0; },
+      [](Settings& s) { s.depth = -1; },          [](Settings& s) { s.depth = NAN; },
+      [](Settings& s) { s.damping = -1; },        [](Settings& s) { s.damping = NAN; },
+      [](Settings& s) { s.follow = NAN; },        [](Settings& s) { s.thickness = -1; },
+      [](Settings& s) { s.push_out = INFINITY; }, [](Settings& s) { s.law.stiffness = -1; }};
+  for (std::size_t i = 0; i < wrong.size(); ++i) {
+    const Listen listen;
+    World world;
+    wrong[i](world.contacts.settings);
+    world.add_ground();
+    btRigidBody& box = world.add(cube_of_side(0.2), 1, btVector3(0, 0, 0.11));
+    world.step(120);
+    EXPECT_NEAR(box.getWorldTransform().getOrigin().z(), 0.1, 0.001) << i;
+    ASSERT_EQ(warned.size(), 1u) << i;
+    EXPECT_NE(warned[0].find("default settings"), std::string::npos) << warned[0];
+  }
+}
+
+// A small ball sinks into a large asset until it meets spheres, which leave its faces uncovered.
+TEST(BulletPartners, WhatIsSmallAgainstTheSpheresIsSaid) {
+  for (const double radius : {0.5, 0.02}) {
+    const Listen listen;
+    World world;
+    world.add(cube_of_side(1), 0, btVector3(0, 0, 0));
+    world.add(std::make_unique<btSphereShape>(btScalar(radius)), 1,
+              btVector3(0, 0, btScalar(0.5 + radius)));
+    world.step(1);
+    ASSERT_EQ(warned.size(), radius < 0.1 ? 1u : 0u) << radius;
+    for (const std::string& sentence : warned)
+      EXPECT_NE(sentence.find("small against"), std::string::npos) << sentence;
+  }
+}
+
 TEST(BulletMaterial, OneWorldForAGramAndATon) {
   for (const bool alike : {false, true}) {
     World world;
@@ -422,6 +499,53 @@ TEST(BulletMaterial, AShapeAndAPairMayHaveTheirOwn) {
                 };
               }),
               0.005, 5e-4);
+}
+
+/// A box at rest on a slope of 0.3 rad: how far it moves in a second after a change.
+double slide_after(const std::function<void(World&, btRigidBody&)>& change) {
+  World world;
+  world.contacts.configure(world.world);
+  const btQuaternion turn({0, 1, 0}, 0.3);
+  btRigidBody& slope = world.add(cube_of_side(4), 0, btTransform(turn));
+  slope.setFriction(1);
+  btRigidBody& box =
+      world.add(cube_of_side(0.2), 1, btTransform(turn, quatRotate(turn, {0, 0, 2.1})));
+  box.setFriction(1);
+  world.step(240);
+  const btVector3 before = box.getWorldTransform().getOrigin();
+  change(world, box);
+  world.step(240);
+  return (box.getWorldTransform().getOrigin() - before).length();
+}
+
+// Contacts that hold are not queried again: what an engine changes counts all the same.
+TEST(BulletMaterial, ChangesCountWhileABodyRests) {
+  EXPECT_LT(slide_after([](World&, btRigidBody&) {}), 1e-3);
+  const double free = 0.5 * 9.81 * std::sin(0.3);
+  EXPECT_NEAR(slide_after([](World&, btRigidBody& box) { box.setFriction(0); }), free, 0.02 * free);
+  World world;
+  world.add_ground();
+  btRigidBody& box = world.add(cube_of_side(0.2), 1, btVector3(0, 0, 0.1));
+  world.step(240);
+  world.contacts.settings.depth = 0.02;
+  world.step(240);
+  EXPECT_NEAR(box.getWorldTransform().getOrigin().z(), 0.1 - 0.02 * 0.2, 2e-4);
+}
+
+// As a conveyor's: for every point in every step, also where nothing moves.
+TEST(BulletEvents, AddedCallbackSetsEachPointInEachStep) {
+  started = 0;
+  gContactAddedCallback = [](btManifoldPoint&, const btCollisionObjectWrapper*, int, int,
+                             const btCollisionObjectWrapper*, int, int) { return ++started > 0; };
+  World world;
+  world.add_ground();
+  btRigidBody& box = world.add(cube_of_side(1), 1, btVector3(0, 0, 0.499));
+  box.setCollisionFlags(box.getCollisionFlags() | btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+  world.step(240);
+  started = 0;
+  world.step(240);
+  EXPECT_EQ(started, 4 * 240);
+  gContactAddedCallback = nullptr;
 }
 
 TEST(BulletThreads, PairsAreAnsweredOnManyAtOnce) {

@@ -72,7 +72,7 @@ SceneResult run_impacts(const SceneOptions& options) {
         const Eigen::Quaterniond way(draw(), draw(), draw(), draw());
         const auto n = static_cast<double>(falls.size());
         const Eigen::Isometry3d body =
-            place({0.5 * std::fmod(n, 60), 0.5 * std::floor(n / 60), reach + 0.01 * (1 + draw())},
+            place({10 * std::fmod(n, 60), 10 * std::floor(n / 60), reach + 0.01 * (1 + draw())},
                   i == 0 ? Eigen::Quaterniond::Identity() : way.normalized());
         Fall fall;
         fall.body = &world.add(part, 1000, body * part.frame().in_mesh.inverse(), kFriction);
@@ -82,7 +82,7 @@ SceneResult run_impacts(const SceneOptions& options) {
     }
   }
   Run run(world, options);
-  run.go(options.seconds > 0 ? options.seconds : 0.6, [&] {
+  run.go(options.seconds > 0 ? options.seconds : 1.2, [&] {
     for (Fall& fall : falls) {
       const double z = fall.body->getCenterOfMassPosition().z(), mass = 1 / fall.body->getInvMass();
       const bool touches = world.contact_force(*fall.body).norm() > 0;

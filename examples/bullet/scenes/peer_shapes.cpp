@@ -8,6 +8,8 @@
 #endif
 
 #include <ist/bullet/convert.h>
+#include <algorithm>
+#include <cmath>
 
 std::unique_ptr<PeerShape> make_gimpact_shape(const Part& part, double margin) {
   auto peer = std::make_unique<PeerShape>();
@@ -41,6 +43,20 @@ std::unique_ptr<PeerShape> make_hull_shape(const Part& part, double margin) {
       reinterpret_cast<const btScalar*>(hull.getVertexPointer()), hull.numVertices());
   shape->setMargin(margin);
   peer->shape = std::move(shape);
+  return peer;
+}
+
+std::unique_ptr<PeerShape> make_own_shape(const Part& part, double margin) {
+  const std::vector<Eigen::Vector3d> corners = part.vertices_in_body();
+  const Eigen::Vector3d half = corners[0].cwiseAbs();
+  const bool is_box =
+      std::abs(8 * half.prod() - part.volume()) < 1e-9 * part.volume() &&
+      std::all_of(corners.begin(), corners.end(), [&](const Eigen::Vector3d& corner) {
+        return (corner.cwiseAbs() - half).norm() < 1e-9 * half.norm();
+      });
+  if (!is_box) return make_hull_shape(part, margin);
+  auto peer = std::make_unique<PeerShape>();
+  peer->shape = std::make_unique<btBoxShape>(ist::bullet::to_bullet(half));
   return peer;
 }
 

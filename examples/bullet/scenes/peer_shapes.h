@@ -24,6 +24,9 @@ std::unique_ptr<PeerShape> make_gimpact_shape(const Part& part, double margin);
 /// One convex hull, of at most 42 corners, as engines have them: btShapeHull's.
 std::unique_ptr<PeerShape> make_hull_shape(const Part& part, double margin);
 
+/// btBoxShape where the part is a box about its body's origin, else one convex hull.
+std::unique_ptr<PeerShape> make_own_shape(const Part& part, double margin);
+
 /// Convex hulls of a decomposition by HACD, in the body's frame. Null where Bullet's extras are
 /// missing (dev setup --bullet).
 std::unique_ptr<PeerShape> make_hulls_shape(const Part& part, std::size_t hulls, double margin);

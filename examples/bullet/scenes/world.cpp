@@ -21,6 +21,8 @@ const char* name_of(Way way) {
       return "GImpact";
     case Way::hulls:
       return "convex hulls";
+    case Way::own:
+      return "Bullet's boxes, one hull a part";
   }
   return "";
 }
@@ -53,7 +55,7 @@ SceneWorld::SceneWorld(const WorldSettings& settings)
   world_.setGravity(to_bullet(settings.gravity));
   // Bullet's own contacts part bodies as it does by default.
   world_.getSolverInfo().m_splitImpulse =
-      settings.way == Way::gimpact || settings.way == Way::hulls;
+      settings.way != Way::solver && settings.way != Way::wrench;
   world_.addAction(&contacts_);  // stops bodies that ask for it
   if (settings.way == Way::wrench) ist::bullet::push_in_every_tick(world_);
 }
@@ -71,6 +73,7 @@ btCollisionShape* SceneWorld::shape_of(const Part& part) {
   std::unique_ptr<PeerShape>& shape = peer_shapes_[&part];
   if (shape == nullptr) {
     shape = settings_.way == Way::gimpact ? make_gimpact_shape(part, settings_.margin)
+            : settings_.way == Way::own   ? make_own_shape(part, settings_.margin)
             : settings_.hulls == 0        ? make_hull_shape(part, settings_.margin)
                                    : make_hulls_shape(part, settings_.hulls, settings_.margin);
     if (shape == nullptr)

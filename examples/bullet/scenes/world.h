@@ -13,7 +13,7 @@
 #include "peer_shapes.h"
 
 /// Who finds the contacts of the parts, and what they do.
-enum class Way { solver, wrench, gimpact, hulls };
+enum class Way { solver, wrench, gimpact, hulls, own };
 const char* name_of(Way way);
 
 constexpr double kGravity = 9.81;               ///< [m/s²]

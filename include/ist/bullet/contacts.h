@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include <ist/bullet/shape.h>
 #include <ist/contact_law.h>
@@ -86,6 +87,12 @@ struct Contact {
   double clearance = 0;
 };
 
+/// How far two bodies get in a motion.
+struct Passage {
+  double share = 1;      ///< [0, 1] of the motion, until they meet, or in contact are too deep
+  bool touched = false;  ///< they were in contact as it began
+};
+
 /// Computes the contact of two objects at their current transforms, by Settings::patches and query.
 /// False if neither is a Shape, or if a shape is not supported; compounds are not taken apart.
 bool find_contact(const btCollisionObject& first, const btCollisionObject& second,
@@ -125,7 +132,9 @@ class Contacts : public btActionInterface {
   /// getCcdMotionThreshold(), and in which a point moves by more relative to the other body, are
   /// moved back to where they overlap by a quarter of the threshold. Bodies in contact keep
   /// moving while their mean depth is below that, and deeper ones while it grows by less. The rest
-  /// of the motion is lost, as with Bullet's own sweeps, and with it the speed that gravity gave.
+  /// of the motion is lost, as with Bullet's own sweeps, and with it the speed that gravity gave. A
+  /// body that a contact lets get on by less than a sixteenth of its motion is jammed, and loses up
+  /// to half of its speed: else it would turn on in slow motion.
   ///
   /// Response::solver only. A compound is stopped by its children, by the table of
   /// docs/engines.md. Links of multibodies are not stopped, since Bullet's broad phase does not
@@ -145,11 +154,12 @@ class Contacts : public btActionInterface {
                                                    const btCollisionObjectWrapper* a,
                                                    const btCollisionObjectWrapper* b) override;
   };
-  /// The share of a pair's motion in the last step: see PairAlgorithm::share_until_impact().
-  double share_of(const btCollisionAlgorithm* algorithm, const btCollisionObject& first,
-                  const btCollisionObject& second, btScalar step) const;
+  /// The passage of a pair in the last step: see PairAlgorithm::passage().
+  Passage passage_of(const btCollisionAlgorithm* algorithm, const btCollisionObject& first,
+                     const btCollisionObject& second, btScalar step) const;
 
   CreateFunc create_;
+  std::vector<const btCollisionObject*> jammed_;  // in the last step
 };
 
 /// One pair of objects whose boxes overlap, or of a child of a compound. Bullet creates and
@@ -158,7 +168,8 @@ class Contacts : public btActionInterface {
 /// Events are Bullet's: gContactStartedCallback when a pair begins to touch, gContactEndedCallback
 /// when it no longer does, both with its first manifold, and gContactProcessedCallback for every
 /// point in every step. A point persists as long as its patch keeps its id. gContactAddedCallback
-/// may change a point whenever it was computed.
+/// may change a point in every step; what it sets of the spring lasts until the point is computed
+/// again.
 class PairAlgorithm : public btActivatingCollisionAlgorithm {
  public:
   PairAlgorithm(const btCollisionAlgorithmConstructionInfo& info, const Contacts& contacts,
@@ -177,18 +188,19 @@ class PairAlgorithm : public btActivatingCollisionAlgorithm {
   /// The force that push() last applied to the second object; the first got the opposite.
   const ContactForce& pushed() const;
 
-  /// The share [0, 1] of a motion after which two bodies have met, or in contact are too deep: see
-  /// Contacts::updateAction(). 1 for a motion that exceeds no getCcdMotionThreshold().
-  double share_until_impact(const btCollisionObject& first, const btCollisionObject& second,
-                            const std::array<btTransform, 2>& from,
-                            const std::array<btTransform, 2>& to) const;
+  /// How far two bodies get in a motion: see Contacts::updateAction(). All of it, where it exceeds
+  /// no getCcdMotionThreshold().
+  Passage passage(const btCollisionObject& first, const btCollisionObject& second,
+                  const std::array<btTransform, 2>& from,
+                  const std::array<btTransform, 2>& to) const;
 
   /// The same for the motion from world transforms to interpolation transforms.
   btScalar calculateTimeOfImpact(btCollisionObject* first, btCollisionObject* second,
                                  const btDispatcherInfo&, btManifoldResult*) override {
-    return static_cast<btScalar>(share_until_impact(
-        *first, *second, {first->getWorldTransform(), second->getWorldTransform()},
-        {first->getInterpolationWorldTransform(), second->getInterpolationWorldTransform()}));
+    return static_cast<btScalar>(
+        passage(*first, *second, {first->getWorldTransform(), second->getWorldTransform()},
+                {first->getInterpolationWorldTransform(), second->getInterpolationWorldTransform()})
+            .share);
   }
   void getAllContactManifolds(btManifoldArray& manifolds) override;
 
