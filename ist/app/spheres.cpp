@@ -78,14 +78,15 @@ void warn_of_size(const RobotModel& robot, const std::string& link, const Triang
       robot.file.path, link, box.diagonal().norm(), apart);
 }
 
-/// Joints that move in the file, but not here; those that carry a whole robot do not matter.
+/// Joints that move in the file, but not here; one that carries the whole robot does not matter.
 std::vector<std::string> taken_as_fixed(const RobotModel& robot) {
   const RobotLink& root = robot.links[robot.order.front()];
-  const bool is_bare = root.collision.empty() && root.visual.empty();
+  const auto is_first = [&](const RobotJoint& j) { return j.parent == robot.order.front(); };
+  const bool is_bare = root.collision.empty() && root.visual.empty() &&
+                       std::count_if(robot.joints.begin(), robot.joints.end(), is_first) == 1;
   std::vector<std::string> names;
   for (const RobotJoint& joint : robot.joints)
-    if (joint.taken_as_fixed && !(is_bare && joint.parent == robot.order.front()))
-      names.push_back(joint.name);
+    if (joint.taken_as_fixed && !(is_bare && is_first(joint))) names.push_back(joint.name);
   return names;
 }
 
@@ -109,7 +110,8 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
   out.taken_as_fixed = taken_as_fixed(out.robot);
   if (!out.taken_as_fixed.empty())
     spdlog::warn(
-        "{}: taken as fixed, because they have several axes, or slide without limits: {}; "
+        "{}: taken as fixed, because they have several axes, or slide without limits, or carry a "
+        "free body: {}; "
         "collisions are found only as their links stand in the file",
         options.input, fmt::join(out.taken_as_fixed, ", "));
   for (const RobotLink& link : out.robot.links) {

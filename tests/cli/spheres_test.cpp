@@ -313,6 +313,17 @@ TEST_F(RobotCommands, JointsThatAreTakenAsFixedAreNamed) {
   EXPECT_NE(outcome.err.find("taken as fixed"), std::string::npos) << outcome.err;
   EXPECT_NE(outcome.err.find(": u, s; "), std::string::npos) << outcome.err;
   EXPECT_EQ(Json::parse(read("t.json"))["taken_as_fixed"], Json::parse("[\"u\", \"s\"]"));
+
+  // A free joint alone carries the robot; beside others it carries a thing.
+  const std::string free = "<body pos='0 0 3'><freejoint name='f'/><geom size='1'/></body>";
+  write("robot.xml", "<mujoco><worldbody>" + free + "</worldbody></mujoco>");
+  write("thing.xml",
+        "<mujoco><worldbody>" + free + "<body><geom size='1'/></body></worldbody></mujoco>");
+  for (const auto& [file, names] :
+       {std::pair("robot.xml", "[]"), std::pair("thing.xml", "[\"f\"]")}) {
+    ASSERT_EQ(ist({"spheres", file, "-o", "t.json"}).exit_code, 0);
+    EXPECT_EQ(Json::parse(read("t.json"))["taken_as_fixed"], Json::parse(names)) << file;
+  }
 }
 
 TEST_F(RobotCommands, CountsOfTheRobotAndOfLinks) {
