@@ -275,10 +275,13 @@ void compare_links(SphereRobot& input, const WantedPose& wanted, const SpheresOp
                    const ProgressCallback& progress) {
   LinkSolids solids;
   std::vector<std::string> names;
+  std::set<std::size_t> larger;
   std::size_t next = 0;
   for (const SphereLink& link : input.links) {
+    const std::string why =
+        solids.add(link.has_mesh ? &input.meshes[next++] : nullptr, link.given, link.read);
+    if (!why.empty() || link.bounding_capsule) larger.insert(names.size());
     names.push_back(link.name);
-    const std::string why = solids.add(link.has_mesh ? &input.meshes[next++] : nullptr, link.given);
     if (!why.empty())
       spdlog::warn(
           "{}: link {}: collisions with other links are judged by its spheres, because "
@@ -290,7 +293,7 @@ void compare_links(SphereRobot& input, const WantedPose& wanted, const SpheresOp
       [&](std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) {
         return solids.overlap(a, b, b_in_a);
       },
-      wanted);
+      wanted, std::move(larger));
   input.self =
       study.of(input.covers(), options.kind == Kind::cover || options.kind == Kind::capsules);
   if (options.kind == Kind::cover)

@@ -185,6 +185,12 @@ TEST(SelfCollision, IgnoresNeighboursAndPairsWhoseSolidsNeverOrAlwaysOverlap) {
     }
   // The same around solids that always do.
   EXPECT_TRUE(ignored_of(study(fat.robot, fat.spheres, 0.9)).contains("ac Always"));
+  // If one of them is larger than its link, this may be in fewer positions.
+  const SelfCollision larger =
+      SelfCollisionStudy(fat.robot, names_of(fat.spheres), balls(fat.spheres, 0.9), {}, {2})
+          .of(fat.spheres, true);
+  EXPECT_FALSE(ignored_of(larger).contains("ac Always"));
+  EXPECT_TRUE(ignored_of(larger).contains("bd Always"));
 }
 
 TEST(SelfCollision, FalseMeetingsAreOfSpheresWhileNoSolidsOverlap) {

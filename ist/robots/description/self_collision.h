@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -26,7 +27,7 @@ struct LinkPair {
   /// Why a planner is not to compare their spheres; empty: it is to.
   ///
   /// Adjacent: a joint connects them, or links without spheres alone stand between. Always: the
-  /// solids overlapped in all positions tried. Never: in none, though the spheres did in 1 % or
+  /// solids overlapped in all positions tried, and are no larger than the links. Never: in none, though the spheres did in 1 % or
   /// more. Excluded: the robot's file or SRDF says so.
   std::string ignored;
   std::size_t tried = 0;  ///< positions of the joints between them that decided it; 0: none did
@@ -92,9 +93,10 @@ struct WantedPose {
 /// first. The same input gives the same answer.
 class SelfCollisionStudy {
  public:
-  /// `names`: of the links to compare. Keeps a reference to the robot.
+  /// `names`: of the links to compare. `larger`: those whose overlaps are of more than the link.
+  /// Keeps a reference to the robot.
   SelfCollisionStudy(const RobotModel& robot, std::vector<std::string> names, LinksOverlap overlap,
-                     WantedPose wanted);
+                     WantedPose wanted, std::set<std::size_t> larger = {});
   ~SelfCollisionStudy();
 
   /// `links`: spheres of each of the links, in their order. `cover`: each contains its link. What
@@ -117,6 +119,7 @@ class SelfCollisionStudy {
   const std::vector<std::string> names_;
   const LinksOverlap overlap_;
   const WantedPose wanted_;
+  const std::set<std::size_t> larger_;  ///< of names_
   std::vector<Pair> pairs_;
   std::map<std::size_t, double> locked_;  ///< joints of grippers, at which position
   std::vector<std::pair<std::string, Positions>> notable_;  ///< poses to begin with, in order
