@@ -267,7 +267,12 @@ WantedPose wanted_pose(const RobotModel& robot, const SpheresOptions& options) {
   WantedPose wanted;
   for (const auto& [name, position] : options.pose)
     wanted.positions[joint_at(robot, name, position)] = position;
-  if (!options.srdf.empty()) wanted.states = group_states(robot, options.srdf);
+  if (options.srdf.empty()) return wanted;
+  GroupStates states = group_states(robot, options.srdf);
+  wanted.states = std::move(states.poses);
+  if (!states.unfit.empty())
+    spdlog::warn("{}: left out, because they name no joint of {}, or exceed its limits: {}",
+                 options.srdf, robot.name, fmt::join(states.unfit, ", "));
   return wanted;
 }
 

@@ -127,6 +127,14 @@ TEST(Mjcf, FreeBodiesAreTakenAsFixed) {
   }
 }
 
+TEST(Mjcf, NamesAreDecoded) {
+  const RobotModel robot = mjcf(
+      "<asset><mesh file='a&amp;b.stl'/></asset><worldbody><body name='x&lt;y'>"
+      "<geom type='mesh' mesh='a&amp;b'/></body></worldbody>");
+  EXPECT_EQ(robot.links[1].name, "x<y");
+  EXPECT_EQ(std::get<LinkMesh>(robot.links[1].collision[0].shape).file, "a&b.stl");
+}
+
 TEST(Mjcf, ShapesKnowTheirLines) {
   const RobotModel robot = read_robot(SourceFile{
       "m.xml",
@@ -145,6 +153,7 @@ TEST(Mjcf, SaysWhatIsWrongAndWhere) {
          "m.xml: line 2: <joint>: its type \"screw\" is unknown");
   expect("<worldbody><body><joint range='2 1'/></body></worldbody>", "the smaller first");
   expect("<worldbody><body name='a'/><body name='a'/></worldbody>", "duplicates the body");
+  expect("<worldbody><body name='a\nb'/></worldbody>", "control characters");
   expect("<worldbody><body quat='0 0 0 0'/></worldbody>", "not all 0");
   for (const char* turn : {"zaxis='0 0 0'", "axisangle='0 0 0 90'", "xyaxes='1 0 0 2 0 0'"})
     expect("<worldbody><body " + std::string(turn) + "/></worldbody>",

@@ -14,6 +14,7 @@
 
 #include "mesh/import/text_scanner.h"
 #include "mesh/import/xml_document.h"
+#include "robots/description/robot_xml.h"
 
 namespace ist {
 namespace {
@@ -95,14 +96,16 @@ class MjcfReader {
     node.where = path + ": line " + std::to_string(line) + ": <" + node.name + ">";
     for (const char* const key : kAttributes)
       if (const std::string_view text = xml.attribute(element, key); !text.empty())
-        node.attributes[key] = text;
+        node.attributes[key] = decoded(text);
+    if (const std::string fault = name_fault(value(node.attributes, "name")); !fault.empty())
+      fail(node, fault);
     for (std::uint32_t e = xml[element].first_child; e != XmlDocument::kNone;
          e = xml[e].next_sibling) {
       if (xml[e].name != "include") {
         node.children.push_back(node_of(xml, e, path, depth));
         continue;
       }
-      const std::string name(xml.attribute(e, "file"));
+      const std::string name = decoded(xml.attribute(e, "file"));
       included_.push_back(read_source_file((folder_ / name).string()));
       Node inside = tree_of(included_.back(), depth + 1).front();
       included_.pop_back();
