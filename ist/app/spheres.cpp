@@ -78,14 +78,15 @@ void warn_of_size(const RobotModel& robot, const std::string& link, const Triang
       robot.file.path, link, box.diagonal().norm(), apart);
 }
 
-/// Joints that move in the file, but not here, except those that carry the whole robot.
+/// Joints that move in the file, but not here; one that carries the whole robot does not matter.
 std::vector<std::string> taken_as_fixed(const RobotModel& robot) {
   const RobotLink& root = robot.links[robot.order.front()];
-  const bool is_bare = root.collision.empty() && root.visual.empty();
+  const auto is_first = [&](const RobotJoint& j) { return j.parent == robot.order.front(); };
+  const bool is_bare = root.collision.empty() && root.visual.empty() &&
+                       std::count_if(robot.joints.begin(), robot.joints.end(), is_first) == 1;
   std::vector<std::string> names;
   for (const RobotJoint& joint : robot.joints)
-    if (joint.taken_as_fixed && !(is_bare && joint.parent == robot.order.front()))
-      names.push_back(joint.name);
+    if (joint.taken_as_fixed && !(is_bare && is_first(joint))) names.push_back(joint.name);
   return names;
 }
 
@@ -109,7 +110,8 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
   out.taken_as_fixed = taken_as_fixed(out.robot);
   if (!out.taken_as_fixed.empty())
     spdlog::warn(
-        "{}: taken as fixed, because they have several axes, or slide without limits: {}; "
+        "{}: taken as fixed, because they have several axes, or slide without limits, or carry a "
+        "free body: {}; "
         "collisions are found only as their links stand in the file",
         options.input, fmt::join(out.taken_as_fixed, ", "));
   for (const RobotLink& link : out.robot.links) {
@@ -265,7 +267,12 @@ WantedPose wanted_pose(const RobotModel& robot, const SpheresOptions& options) {
   WantedPose wanted;
   for (const auto& [name, position] : options.pose)
     wanted.positions[joint_at(robot, name, position)] = position;
-  if (!options.srdf.empty()) wanted.states = group_states(robot, options.srdf);
+  if (options.srdf.empty()) return wanted;
+  GroupStates states = group_states(robot, options.srdf);
+  wanted.states = std::move(states.poses);
+  if (!states.unfit.empty())
+    spdlog::warn("{}: left out, because they name no joint of {}, or exceed its limits: {}",
+                 options.srdf, robot.name, fmt::join(states.unfit, ", "));
   return wanted;
 }
 
@@ -273,10 +280,13 @@ void compare_links(SphereRobot& input, const WantedPose& wanted, const SpheresOp
                    const ProgressCallback& progress) {
   LinkSolids solids;
   std::vector<std::string> names;
+  std::set<std::size_t> larger;
   std::size_t next = 0;
   for (const SphereLink& link : input.links) {
+    const std::string why =
+        solids.add(link.has_mesh ? &input.meshes[next++] : nullptr, link.given, link.read);
+    if (!why.empty() || link.bounding_capsule) larger.insert(names.size());
     names.push_back(link.name);
-    const std::string why = solids.add(link.has_mesh ? &input.meshes[next++] : nullptr, link.given);
     if (!why.empty())
       spdlog::warn(
           "{}: link {}: collisions with other links are judged by its spheres, because "
@@ -288,7 +298,7 @@ void compare_links(SphereRobot& input, const WantedPose& wanted, const SpheresOp
       [&](std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) {
         return solids.overlap(a, b, b_in_a);
       },
-      wanted);
+      wanted, std::move(larger));
   input.self =
       study.of(input.covers(), options.kind == Kind::cover || options.kind == Kind::capsules);
   if (options.kind == Kind::cover)

@@ -15,9 +15,11 @@ class LinkSolids {
   LinkSolids();
   ~LinkSolids();
 
-  /// Adds a link: its closed mesh, if it has one, and spheres of its description. Returns the
-  /// reason why exact queries of it are impossible; "" if they are possible.
-  std::string add(const ClosedMesh* mesh, std::span<const CoverSphere> spheres);
+  /// Adds a link: its closed mesh, if it has one, and spheres of its description. `read`: the mesh
+  /// before it was closed, or nothing; what the closed one lacks of it, such as sheets that repair
+  /// dropped, belongs to the link too. Returns why no exact query can be asked of it; "" if one can.
+  std::string add(const ClosedMesh* mesh, std::span<const CoverSphere> spheres,
+                  const TriangleMesh& read = {});
 
   /// By links in the order of add(): true if they share a volume above 0, or if a link has no exact
   /// solid. Thread-safe.

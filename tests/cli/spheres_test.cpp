@@ -280,6 +280,31 @@ TEST_F(RobotCommands, WhatRepairDroppedIsCovered) {
   }
 }
 
+/// A box slides through the sheet, and beside it.
+TEST_F(RobotCommands, WhatRepairDroppedCollides) {
+  std::string cube = read("cube.obj");
+  const auto corners = static_cast<int>(std::count(cube.begin(), cube.end(), 'v'));
+  write("fin.obj", cube + "v 2 0 0\nv 3 0 0\nv 2 1 0\nf " + std::to_string(corners + 1) + " " +
+                       std::to_string(corners + 2) + " " + std::to_string(corners + 3) + "\n");
+  const auto box = [](const std::string& name, const std::string& geometry) {
+    return "<link name='" + name + "'><collision>" + geometry + "</collision></link>";
+  };
+  const std::string slide = "<axis xyz='0 0 1'/><limit lower='-0.2' upper='0.2'/></joint>";
+  write("pair.urdf",
+        "<robot name='r'>" + box("a", "<geometry><mesh filename='fin.obj'/></geometry>") +
+            box("s", "<origin xyz='0 9 0'/><geometry><sphere radius='0.1'/></geometry>") +
+            box("b", "<geometry><box size='0.2 0.2 0.2'/></geometry>") +
+            "<joint name='j' type='fixed'><parent link='a'/><child link='s'/><origin xyz='2.3 0.3 "
+            "0'/></joint><joint name='k' type='prismatic'><parent link='s'/><child link='b'/>" +
+            slide + "</robot>");
+  ASSERT_EQ(ist({"spheres", "pair.urdf", "-o", "p.json", "--count", "8", "--repair"}).exit_code, 0);
+  const Json self = Json::parse(read("p.json"))["self_collision"];
+  // Half of the positions are within 0.1 of the sheet.
+  EXPECT_NEAR(self["colliding"].get<double>() / self["samples"].get<double>(), 0.5, 0.05);
+  EXPECT_EQ(self["missed"], 0);
+  for (const Json& pair : self["ignored"]) EXPECT_EQ(pair["reason"], "Adjacent") << pair;
+}
+
 TEST_F(RobotCommands, WhatCannotBeClosedGetsABoundingCapsule) {
   write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   write(
@@ -314,6 +339,17 @@ TEST_F(RobotCommands, JointsThatAreTakenAsFixedAreNamed) {
   EXPECT_NE(outcome.err.find("taken as fixed"), std::string::npos) << outcome.err;
   EXPECT_NE(outcome.err.find(": u, s; "), std::string::npos) << outcome.err;
   EXPECT_EQ(Json::parse(read("t.json"))["taken_as_fixed"], Json::parse("[\"u\", \"s\"]"));
+
+  // A free joint alone carries the robot; beside others it carries a thing.
+  const std::string free = "<body pos='0 0 3'><freejoint name='f'/><geom size='1'/></body>";
+  write("robot.xml", "<mujoco><worldbody>" + free + "</worldbody></mujoco>");
+  write("thing.xml",
+        "<mujoco><worldbody>" + free + "<body><geom size='1'/></body></worldbody></mujoco>");
+  for (const auto& [file, names] :
+       {std::pair("robot.xml", "[]"), std::pair("thing.xml", "[\"f\"]")}) {
+    ASSERT_EQ(ist({"spheres", file, "-o", "t.json"}).exit_code, 0);
+    EXPECT_EQ(Json::parse(read("t.json"))["taken_as_fixed"], Json::parse(names)) << file;
+  }
 }
 
 TEST_F(RobotCommands, CountsOfTheRobotAndOfLinks) {

@@ -48,6 +48,7 @@ TEST(Mjcf, BodiesJointsAndGeoms) {
           <geom type='mesh' mesh='hand'/>
           <geom type='ellipsoid' size='1 2 3'/>
           <geom type='box' mesh='hand'/>
+          <geom mesh='hand'/>
         </body>
       </body>
     </worldbody>
@@ -62,7 +63,7 @@ TEST(Mjcf, BodiesJointsAndGeoms) {
   EXPECT_EQ(std::get<LinkBox>(robot.links[1].visual[0].shape).half_extents, Vector3d(1, 2, 3));
   const RobotLink& b = robot.links.back();
   EXPECT_EQ(b.name, "b");
-  ASSERT_EQ(b.collision.size(), 4u);
+  ASSERT_EQ(b.collision.size(), 5u);
   const auto& capsule = std::get<LinkCapsule>(b.collision[0].shape);
   EXPECT_EQ(capsule.half_height, 1);
   EXPECT_EQ(b.collision[0].translation, Vector3d(0, 0, 1));
@@ -70,6 +71,7 @@ TEST(Mjcf, BodiesJointsAndGeoms) {
   EXPECT_EQ(std::get<LinkMesh>(b.collision[1].shape).scale, Vector3d(2, 2, 2));
   EXPECT_EQ(std::get<LinkEllipsoid>(b.collision[2].shape).radii, Vector3d(1, 2, 3));
   EXPECT_NE(std::get<LinkFault>(b.collision[3].shape).what.find("m.xml: line"), std::string::npos);
+  EXPECT_TRUE(std::holds_alternative<LinkFault>(b.collision[4].shape));  // a sphere by default
   EXPECT_EQ(robot.excluded.size(), 1u);
 
   // The hinge turns about y through (0, 0, 0.5) of b, whose frame is turned by 90 degrees.
@@ -99,6 +101,40 @@ TEST(Mjcf, IncludesAndEqualities) {
   EXPECT_EQ(link_frames(robot, {0, 0.25, 0})[3].translation(), Vector3d(0, 0.25, 0));
 }
 
+TEST(Mjcf, JointsOfAChainFollowItsLastFromWhereTheyStand) {
+  for (const bool reversed : {false, true}) {
+    const std::string first = "<joint joint1='c' joint2='b' polycoef='0.5 -1 0 0 0'/>",
+                      second = "<joint joint1='b' joint2='a' polycoef='0.25 2 0 0 0'/>";
+    const RobotModel robot = mjcf(
+        "<worldbody><body><joint name='a' type='slide' range='-9 9' ref='1'/>"
+        "<body><joint name='b' type='slide' range='-9 9' ref='2'/>"
+        "<body><joint name='c' type='slide' range='-9 9' ref='4'/></body></body></body>"
+        "</worldbody><equality>" +
+        (reversed ? second + first : first + second) + "</equality>");
+    // b − 2 = 0.25 + 2 (a − 1) and c − 4 = 0.5 − (b − 2); each slides from where it stands.
+    const double a = 3, b = 2.25 + 2 * (a - 1), c = 4.5 - (b - 2);
+    const auto frames = link_frames(robot, {a, 0, 0});
+    EXPECT_NEAR(frames[2].translation().z(), a - 1 + b - 2, 1e-12) << reversed;
+    EXPECT_NEAR(frames[3].translation().z(), a - 1 + b - 2 + c - 4, 1e-12) << reversed;
+  }
+}
+
+TEST(Mjcf, FreeBodiesAreTakenAsFixed) {
+  for (const char* free : {"<freejoint name='f'/>", "<joint name='f' type='free'/>"}) {
+    const RobotModel robot = mjcf("<worldbody><body>" + std::string(free) + "</body></worldbody>");
+    EXPECT_TRUE(robot.joints[0].taken_as_fixed);
+    EXPECT_EQ(robot.joints[0].name, "f");
+  }
+}
+
+TEST(Mjcf, NamesAreDecoded) {
+  const RobotModel robot = mjcf(
+      "<asset><mesh file='a&amp;b.stl'/></asset><worldbody><body name='x&lt;y'>"
+      "<geom type='mesh' mesh='a&amp;b'/></body></worldbody>");
+  EXPECT_EQ(robot.links[1].name, "x<y");
+  EXPECT_EQ(std::get<LinkMesh>(robot.links[1].collision[0].shape).file, "a&b.stl");
+}
+
 TEST(Mjcf, ShapesKnowTheirLines) {
   const RobotModel robot = read_robot(SourceFile{
       "m.xml",
@@ -117,6 +153,7 @@ TEST(Mjcf, SaysWhatIsWrongAndWhere) {
          "m.xml: line 2: <joint>: its type \"screw\" is unknown");
   expect("<worldbody><body><joint range='2 1'/></body></worldbody>", "the smaller first");
   expect("<worldbody><body name='a'/><body name='a'/></worldbody>", "duplicates the body");
+  expect("<worldbody><body name='a\nb'/></worldbody>", "control characters");
   expect("<worldbody><body quat='0 0 0 0'/></worldbody>", "not all 0");
   for (const char* turn : {"zaxis='0 0 0'", "axisangle='0 0 0 90'", "xyaxes='1 0 0 2 0 0'"})
     expect("<worldbody><body " + std::string(turn) + "/></worldbody>",

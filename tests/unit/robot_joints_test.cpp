@@ -185,6 +185,12 @@ TEST(SelfCollision, IgnoresNeighboursAndPairsWhoseSolidsNeverOrAlwaysOverlap) {
     }
   // The same around solids that always do.
   EXPECT_TRUE(ignored_of(study(fat.robot, fat.spheres, 0.9)).contains("ac Always"));
+  // If one of them is larger than its link, this may be in fewer positions.
+  const SelfCollision larger =
+      SelfCollisionStudy(fat.robot, names_of(fat.spheres), balls(fat.spheres, 0.9), {}, {2})
+          .of(fat.spheres, true);
+  EXPECT_FALSE(ignored_of(larger).contains("ac Always"));
+  EXPECT_TRUE(ignored_of(larger).contains("bd Always"));
 }
 
 TEST(SelfCollision, FalseMeetingsAreOfSpheresWhileNoSolidsOverlap) {
@@ -295,13 +301,19 @@ TEST(SelfCollision, GrippersAreLockedOpen) {
 
 TEST(GroupStates, AreReadFromAnSrdf) {
   const Turning robot = turning();
-  const TempFile file("r.srdf",
-                      "<robot name='r'><group_state name='up' group='g'><joint name='k' "
-                      "value='0.5'/><joint name='none' value='1'/></group_state></robot>");
-  const auto states = group_states(robot.robot, file.path());
-  ASSERT_EQ(states.size(), 1u);
-  EXPECT_EQ(states[0].first, "up");
-  EXPECT_EQ(states[0].second, (Positions{0, 0.5}));
+  const TempFile file(
+      "r.srdf",
+      "<robot name='r'><group_state name='up' group='g'><joint name='k' "
+      "value='0.5'/><joint name='none' value='1'/></group_state>"
+      "<group_state name='top' group='g'><joint name='k' value='3.0004'/>"
+      "</group_state><group_state name='far' group='g'><joint name='k' value='3.1'/>"
+      "</group_state><group_state name='other' group='g'><joint name='none' "
+      "value='1'/></group_state></robot>");
+  const GroupStates states = group_states(robot.robot, file.path());
+  ASSERT_EQ(states.poses.size(), 2u);
+  EXPECT_EQ(states.poses[0], std::pair(std::string("up"), Positions{0, 0.5}));
+  EXPECT_EQ(states.poses[1], std::pair(std::string("top"), Positions{0, 3}));
+  EXPECT_EQ(states.unfit, (std::set<std::string>{"far", "other"}));
 }
 
 TEST(GroupStates, PairsThatAnSrdfDisables) {

@@ -7,6 +7,7 @@
 #include "mesh/import/source_file.h"
 #include "mesh/import/text_scanner.h"
 #include "mesh/import/xml_document.h"
+#include "robots/description/robot_xml.h"
 
 namespace ist {
 namespace {
@@ -131,30 +132,38 @@ std::vector<std::size_t> gripper_joints(const RobotModel& robot) {
   return joints;
 }
 
-std::vector<std::pair<std::string, Positions>> group_states(const RobotModel& robot,
-                                                            const std::string& srdf) {
-  std::vector<std::pair<std::string, Positions>> states;
+GroupStates group_states(const RobotModel& robot, const std::string& srdf) {
+  constexpr double kRounded = 1e-3;  // [rad or u]
+  GroupStates out;
   for_each_element(srdf, "group_state", [&](const XmlDocument& xml, std::uint32_t e) {
-    Positions& positions =
-        states.emplace_back(xml.attribute(e, "name"), default_positions(robot)).second;
+    Positions positions = default_positions(robot);
+    bool any = false, within = true;
     for (std::uint32_t j = xml[e].first_child; j != XmlDocument::kNone; j = xml[j].next_sibling) {
-      const std::size_t joint = index_named(robot.joints, xml.attribute(j, "name"));
+      const std::size_t joint = index_named(robot.joints, decoded(xml.attribute(j, "name")));
       if (xml[j].name != "joint" || joint == robot.joints.size() || !robot.joints[joint].is_free())
         continue;
       const std::optional<double> value = parse_real(xml.attribute(j, "value"));
       if (!value || !std::isfinite(*value)) xml.fail(j, "its value is not a finite number");
-      positions[joint] = *value;
+      any = true;
+      positions[joint] = std::clamp(*value, robot.joints[joint].lower, robot.joints[joint].upper);
+      within = within && std::abs(positions[joint] - *value) <= kRounded;
     }
+    const std::string name = decoded(xml.attribute(e, "name"));
+    if (any && within)
+      out.poses.emplace_back(name, std::move(positions));
+    else
+      out.unfit.insert(name);
   });
-  return states;
+  return out;
 }
 
 DisabledCollisions disabled_collisions(const RobotModel& robot, const std::string& srdf) {
   DisabledCollisions out;
   for_each_element(srdf, "disable_collisions", [&](const XmlDocument& xml, std::uint32_t e) {
     const auto link = [&](const char* which) {
-      const std::size_t at = index_named(robot.links, xml.attribute(e, which));
-      if (at == robot.links.size()) out.lacking.emplace(xml.attribute(e, which));
+      const std::string name = decoded(xml.attribute(e, which));
+      const std::size_t at = index_named(robot.links, name);
+      if (at == robot.links.size()) out.lacking.insert(name);
       return at;
     };
     const std::size_t a = link("link1"), b = link("link2");

@@ -35,10 +35,14 @@ std::vector<std::size_t> path_to(const RobotModel& robot, std::size_t link);
 /// Free joints of grippers: hands with at most two joints.
 std::vector<std::size_t> gripper_joints(const RobotModel& robot);
 
-/// Named poses of an SRDF (`group_state`), in its order: joints that a state does not mention are
-/// as in default_positions(). Joints that the robot lacks are skipped. Throws Error.
-std::vector<std::pair<std::string, Positions>> group_states(const RobotModel& robot,
-                                                            const std::string& srdf);
+/// Poses that an SRDF names (`group_state`), in its order: joints that a state does not mention
+/// stand as in default_positions(). Joints that the robot lacks are passed over.
+struct GroupStates {
+  std::vector<std::pair<std::string, Positions>> poses;
+  std::set<std::string> unfit;  ///< those with no joint of the robot, or one beyond its limits
+};
+/// Throws Error.
+GroupStates group_states(const RobotModel& robot, const std::string& srdf);
 
 /// The pairs that planners ignore according to an SRDF (`disable_collisions`).
 struct DisabledCollisions {

@@ -14,6 +14,7 @@
 
 #include "mesh/import/text_scanner.h"
 #include "mesh/import/xml_document.h"
+#include "robots/description/robot_xml.h"
 
 namespace ist {
 namespace {
@@ -95,14 +96,16 @@ class MjcfReader {
     node.where = path + ": line " + std::to_string(line) + ": <" + node.name + ">";
     for (const char* const key : kAttributes)
       if (const std::string_view text = xml.attribute(element, key); !text.empty())
-        node.attributes[key] = text;
+        node.attributes[key] = decoded(text);
+    if (const std::string fault = name_fault(value(node.attributes, "name")); !fault.empty())
+      fail(node, fault);
     for (std::uint32_t e = xml[element].first_child; e != XmlDocument::kNone;
          e = xml[e].next_sibling) {
       if (xml[e].name != "include") {
         node.children.push_back(node_of(xml, e, path, depth));
         continue;
       }
-      const std::string name(xml.attribute(e, "file"));
+      const std::string name = decoded(xml.attribute(e, "file"));
       included_.push_back(read_source_file((folder_ / name).string()));
       Node inside = tree_of(included_.back(), depth + 1).front();
       included_.pop_back();
@@ -263,12 +266,19 @@ class MjcfReader {
     if (!bodies_.emplace(name, 0).second)
       fail(node, "duplicates the body " + in_quotes(name) + ". Rename one of them");
     std::vector<RobotJoint> joints;
+    RobotJoint fixed;
+    fixed.name = name + "_fixed";
     Eigen::Isometry3d from = pose(node, node.attributes);  // the last joint's frame to the next's
-    for (const Node& child : node.children)
-      if (child.name == "joint") add_joints(child, with_defaults(child, own_class), from, joints);
+    for (const Node& child : node.children) {
+      if (child.name != "joint" && child.name != "freejoint") continue;
+      const Attributes a = with_defaults(child, own_class);
+      fixed.taken_as_fixed = child.name == "freejoint" || value(a, "type") == "free";
+      if (fixed.taken_as_fixed)
+        fixed.name = value(a, "name", fixed.name);
+      else
+        add_joints(child, a, from, joints);
+    }
     if (joints.empty() || !from.isApprox(Eigen::Isometry3d::Identity(), 0)) {
-      RobotJoint fixed;
-      fixed.name = name + "_fixed";
       fixed.origin = from;
       joints.push_back(fixed);
     }
@@ -284,7 +294,6 @@ class MjcfReader {
   void add_joints(const Node& node, const Attributes& a, Eigen::Isometry3d& from,
                   std::vector<RobotJoint>& joints) {
     const std::string type = value(a, "type", "hinge");
-    if (type == "free") return;
     const Vector3d at = vector(node, a, "pos", Vector3d::Zero());
     RobotJoint joint;
     joint.name = value(a, "name", "joint_" + std::to_string(robot_.joints.size() + joints.size()));
@@ -308,6 +317,7 @@ class MjcfReader {
     if (type == "hinge" || type == "slide") {
       const std::vector<double> ref = numbers(node, "ref", value(a, "ref", "0"));
       const double zero = ref.empty() ? 0 : type == "hinge" ? angle(ref[0]) : ref[0];
+      zeros_[joint.name] = zero;
       if (type == "hinge") {
         joint.motion = RobotJoint::Motion::turning;
         joint.origin = joint.origin * Eigen::AngleAxisd(-zero, joint.axis);
@@ -344,7 +354,7 @@ class MjcfReader {
   void read_geom(const Node& node, std::size_t link, const std::string& own_class) {
     const Attributes a = with_defaults(node, own_class);
     const bool visual = value(a, "contype", "1") == "0" && value(a, "conaffinity", "1") == "0";
-    const std::string type = value(a, "type", a.contains("mesh") ? "mesh" : "sphere");
+    const std::string type = value(a, "type", "sphere");
     if (type == "plane" || type == "hfield") {
       if (!visual)
         robot_.endless.push_back(value(a, "name", type + " of " + robot_.links[link].name));
@@ -426,17 +436,33 @@ class MjcfReader {
     for (const Node& child : node.children) {
       const Attributes& a = child.attributes;
       if (child.name != "joint" || !a.contains("joint2") || value(a, "active") == "false") continue;
-      const std::size_t one = index_named(robot_.joints, value(a, "joint1")),
-                        by = index_named(robot_.joints, a.at("joint2"));
-      if (one == robot_.joints.size() || by == robot_.joints.size() || one == by ||
-          !robot_.joints[one].is_free() || !robot_.joints[by].is_free())
+      const std::size_t one = index_named(robot_.joints, value(a, "joint1"));
+      std::size_t by = index_named(robot_.joints, a.at("joint2"));
+      if (one == robot_.joints.size() || by == robot_.joints.size() ||
+          !robot_.joints[one].is_free() || robot_.joints[by].motion == RobotJoint::Motion::fixed)
         continue;
       const std::vector<double> c = numbers(child, "polycoef", value(a, "polycoef", "0 1 0 0 0"));
       if (c.size() < 2 || std::any_of(c.begin() + 2, c.end(), [](double x) { return x != 0; }))
         continue;
+      // Positions are counted from where the bodies stand in the file.
+      double multiplier = c[1], offset = zeros_[robot_.joints[one].name] + c[0] -
+                                         c[1] * zeros_[robot_.joints[by].name];
+      // All of a chain follow its last.
+      if (const RobotJoint last = robot_.joints[by]; last.mimics != kNone) {
+        offset += multiplier * last.offset;
+        multiplier *= last.multiplier;
+        by = last.mimics;
+      }
+      if (one == by) continue;
+      for (RobotJoint& joint : robot_.joints)
+        if (joint.mimics == one) {
+          joint.mimics = by;
+          joint.offset += joint.multiplier * offset;
+          joint.multiplier *= multiplier;
+        }
       robot_.joints[one].mimics = by;
-      robot_.joints[one].offset = c[0];
-      robot_.joints[one].multiplier = c[1];
+      robot_.joints[one].offset = offset;
+      robot_.joints[one].multiplier = multiplier;
     }
   }
 
@@ -448,6 +474,7 @@ class MjcfReader {
   std::map<std::string, Class> defaults_;
   std::map<std::string, PlacedLinkShape> meshes_by_name_;
   std::map<std::string, std::size_t> bodies_;
+  std::map<std::string, double> zeros_;  ///< positions of joints in the file, if not 0
 };
 
 }  // namespace

@@ -21,8 +21,31 @@ namespace ist {
 
 inline constexpr std::uint32_t kNoTag = XmlDocument::kNone;
 
-/// The common parts of the readers of URDF and SDF: values, shapes, joints' ends and limits, and
-/// the tree of links. An element states a value by name: URDF in an attribute, SDF in a child.
+/// Decodes the five entities that every XML file may use.
+inline std::string decoded(std::string_view text) {
+  constexpr std::pair<std::string_view, char> kEntities[] = {
+      {"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&apos;", '\''}};
+  std::string out;
+  while (!text.empty()) {
+    const auto* const entity =
+        std::find_if(std::begin(kEntities), std::end(kEntities),
+                     [&](const auto& e) { return text.starts_with(e.first); });
+    const bool found = entity != std::end(kEntities);
+    out += found ? entity->second : text.front();
+    text.remove_prefix(found ? entity->first.size() : 1);
+  }
+  return out;
+}
+
+/// What is wrong with a name; "" if nothing is.
+inline std::string name_fault(std::string_view name) {
+  const bool control = std::any_of(name.begin(), name.end(),
+                                   [](char c) { return static_cast<unsigned char>(c) < ' '; });
+  return control ? "its name contains control characters. Rename it" : "";
+}
+
+/// What the readers of URDF and SDF share: values, shapes, joints' ends and limits, and the tree of
+/// links. An element states a value by name: URDF in an attribute, SDF in a child.
 class RobotXml {
  public:
   explicit RobotXml(RobotModel& robot) : robot_(robot), xml_(robot.file) {}
@@ -41,28 +64,10 @@ class RobotXml {
     return out;
   }
 
-  /// Decodes the five entities that every XML file may use.
-  static std::string decoded(std::string_view text) {
-    constexpr std::pair<std::string_view, char> kEntities[] = {
-        {"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&apos;", '\''}};
-    std::string out;
-    while (!text.empty()) {
-      const auto* const entity =
-          std::find_if(std::begin(kEntities), std::end(kEntities),
-                       [&](const auto& e) { return text.starts_with(e.first); });
-      const bool found = entity != std::end(kEntities);
-      out += found ? entity->second : text.front();
-      text.remove_prefix(found ? entity->first.size() : 1);
-    }
-    return out;
-  }
-
   std::string name_of(std::uint32_t element) const {
     const std::string name = decoded(xml_.attribute(element, "name"));
     if (name.empty()) xml_.fail(element, "has no name. Add name=\"…\"");
-    if (std::any_of(name.begin(), name.end(),
-                    [](char c) { return static_cast<unsigned char>(c) < ' '; }))
-      xml_.fail(element, "its name contains control characters. Rename it");
+    if (const std::string fault = name_fault(name); !fault.empty()) xml_.fail(element, fault);
     return name;
   }
 

@@ -91,11 +91,13 @@ struct SelfCollisionStudy::Pair {
 SelfCollisionStudy::~SelfCollisionStudy() = default;
 
 SelfCollisionStudy::SelfCollisionStudy(const RobotModel& robot, std::vector<std::string> names,
-                                       LinksOverlap overlap, WantedPose wanted)
+                                       LinksOverlap overlap, WantedPose wanted,
+                                       std::set<std::size_t> larger)
     : robot_(robot),
       names_(std::move(names)),
       overlap_(std::move(overlap)),
-      wanted_(std::move(wanted)) {
+      wanted_(std::move(wanted)),
+      larger_(std::move(larger)) {
   std::vector<std::size_t> links, compared(robot.links.size(), kNone);
   for (const std::string& name : names_) {
     links.push_back(index_named(robot.links, name));
@@ -299,7 +301,9 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
       if (by_spheres && !by_solids && !opens(pair))
         meetings[i].push_back({pair.a, pair.b, k, pair.b_in_a(robot_, samples_[k])});
     }
-    const bool always = solids == told.tried;
+    const bool always =
+        solids == told.tried &&
+        (pair.free.empty() || (!larger_.contains(pair.a) && !larger_.contains(pair.b)));
     // A pair whose spheres rarely overlap costs little: it is compared rather than trusted.
     const bool never = solids == 0 && static_cast<double>(spheres) >=
                                           kWorthIgnoring * static_cast<double>(told.tried);

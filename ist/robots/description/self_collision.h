@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -26,8 +27,8 @@ struct LinkPair {
   /// The reason why a planner should not compare their spheres; empty: it should compare them.
   ///
   /// Adjacent: a joint connects them, or only links without spheres are between them. Always: the
-  /// solids overlapped in all positions tried. Never: in none, though the spheres did in 1 % or
-  /// more. Excluded: by the robot's file or SRDF.
+  /// solids overlapped in all positions tried, and are no larger than the links. Never: in none,
+  /// though the spheres did in 1 % or more. Excluded: by the robot's file or SRDF.
   std::string ignored;
   std::size_t tried = 0;  ///< positions of the joints between them that decided it; 0: none did
   // In SelfCollision::samples other positions:
@@ -92,9 +93,10 @@ struct WantedPose {
 /// the first. Deterministic.
 class SelfCollisionStudy {
  public:
-  /// `names`: of the links to compare. Keeps a reference to the robot.
+  /// `names`: of the links to compare. `larger`: those whose overlaps are of more than the link.
+  /// Keeps a reference to the robot.
   SelfCollisionStudy(const RobotModel& robot, std::vector<std::string> names, LinksOverlap overlap,
-                     WantedPose wanted);
+                     WantedPose wanted, std::set<std::size_t> larger = {});
   ~SelfCollisionStudy();
 
   /// `links`: spheres of each link, in order. `cover`: each set contains its link. Results about
@@ -117,6 +119,7 @@ class SelfCollisionStudy {
   const std::vector<std::string> names_;
   const LinksOverlap overlap_;
   const WantedPose wanted_;
+  const std::set<std::size_t> larger_;  ///< of names_
   std::vector<Pair> pairs_;
   std::map<std::size_t, double> locked_;                    ///< locked positions of gripper joints
   std::vector<std::pair<std::string, Positions>> notable_;  ///< poses to try first, in order
