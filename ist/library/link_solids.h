@@ -17,7 +17,8 @@ class LinkSolids {
 
   /// Adds a link: its closed mesh, if it has one, and spheres of its description. `read`: the mesh
   /// before it was closed, or nothing; what the closed one lacks of it, such as sheets that repair
-  /// dropped, belongs to the link too. Returns why no exact query can be asked of it; "" if one can.
+  /// dropped, belongs to the link too. Returns why no exact query can be asked of it; "" if one
+  /// can.
   std::string add(const ClosedMesh* mesh, std::span<const CoverSphere> spheres,
                   const TriangleMesh& read = {});
 
