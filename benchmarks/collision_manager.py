@@ -93,8 +93,8 @@ def main():
     remarks = [
         f"{versions}; one thread; the least of five calls. Of the meshes, some 1,300, 2,000 and 250 triangles, each "
         "is prepared once here; trimesh prepares the mesh of a `_single` call each time.",
-        "FCL/ist compares the same work where both answer the `same` only. "
-        "Distances of what overlaps: FCL tells that of the first pair that it finds, here it is the deepest of all. "
+        "FCL/ist compares equal work at most where both answer the `same`. Distances of what overlaps or touches: FCL "
+        "tells that of the first pair that it finds, here it is the deepest of all, 0 too. "
         "Contacts have volumes here, one for each connected part of an overlap; FCL's are of triangles.",
         "Alone, `in_collision_internal` asks two objects first that collided before.",
         "Of flush boxes FCL finds no collision at all where faces match (findings/fcl_flush_boxes.sh)."]
