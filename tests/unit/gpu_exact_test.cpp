@@ -24,7 +24,7 @@ TEST(GpuExact, AnswersAreTheCpus) {
 }
 
 TEST(GpuExact, AlignedAnswersAreTheCpus) {
-  const std::vector<BatchPair> pairs = aligned_pairs(33, 1000);
+  const std::vector<BatchPair> pairs = aligned_pairs(33, 1200);
   HostBatch batch(exact_solids());
   const Differences worst =
       compare_exactly(exact_assets(), pairs, batch.run(pairs, Measure::exact));

@@ -79,7 +79,7 @@ double distance2(const FloatPoint& a, const FloatPoint& b) {
   return sum;
 }
 
-/// Patches do not grow over sides where the surface turns by more than 45°, so that those of a
+/// Patches grow last over sides where the surface turns by more than 45°, so that those of a
 /// thread's flanks and of a part's faces are thin along their normals. In 1 − cos of the angle.
 constexpr double kCrease = 0.3;
 
@@ -161,9 +161,9 @@ class Growth {
     return (least_turned < 2 ? least_turned : turned) > kCrease;
   }
 
-  /// Among the triangles that touch the patch and fit, the one that adds fewest vertices, with a
-  /// bonus for those that would be isolated; then the one nearest to the patch's middle, where a
-  /// turned normal counts as distance.
+  /// Among the triangles that touch the patch and fit, one over no crease; then the one that adds
+  /// fewest vertices, with a bonus for those that would be isolated; then the one nearest to the
+  /// patch's middle, where a turned normal counts as distance.
   std::uint32_t best_neighbour(const BlockPatch& patch) const {
     if (patch.triangles.size() == kWidth) return kNone;
     FloatPoint middle = {}, normal = {};
@@ -173,8 +173,8 @@ class Growth {
         normal[k] += normal_[t][k];
       }
     const double length = std::sqrt(dot(normal, normal)) + 1e-30;
-    using Score = std::tuple<int, double, std::uint32_t>;
-    Score best{4, 0, kNone};
+    using Score = std::tuple<bool, int, double, std::uint32_t>;
+    Score best{true, 4, 0, kNone};
     for (const std::uint32_t v : patch.vertices) {
       if (left_[v] == 0 || stars_[v].size() > kLargestStar) continue;
       for (const std::uint32_t t : stars_[v]) {
@@ -186,12 +186,11 @@ class Growth {
         }
         if (patch.vertices.size() + static_cast<std::size_t>(added) > kWidth) continue;
         const double turned = 1 - dot(normal_[t], normal) / length;
-        if (is_over_crease(t, patch, turned)) continue;
-        best = std::min(best, Score{std::max(0, added - last),
+        best = std::min(best, Score{is_over_crease(t, patch, turned), std::max(0, added - last),
                                     distance2(middle_[t], middle) * (1 + turned), t});
       }
     }
-    return std::get<2>(best);
+    return std::get<3>(best);
   }
 
   /// Among the triangles at the patch with the fewest remaining neighbours, the one nearest to its
