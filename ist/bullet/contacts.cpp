@@ -184,11 +184,7 @@ void Contacts::updateAction(btCollisionWorld* world, btScalar step) {
       btRigidBody* const body = movable(*object);
       if (body == nullptr || !(lost > 0)) continue;
       body->setCenterOfMassTransform(moved_back(*body, lost));
-      // What gravity gave in that time, unless a contact has taken it.
-      const btVector3 fall = lost * body->getGravity() * body->getLinearFactor();
-      const btScalar given = std::min(body->getLinearVelocity().dot(fall), fall.length2());
-      if (given > 0)
-        body->setLinearVelocity(body->getLinearVelocity() - given / fall.length2() * fall);
+      body->setLinearVelocity(body->getLinearVelocity() - lost * body->getGravity());
       if (std::find(jammed_.begin(), jammed_.end(), object) == jammed_.end()) continue;
       const btScalar kept = std::max(btScalar(0.5), kJammed * share);
       body->setLinearVelocity(kept * body->getLinearVelocity());

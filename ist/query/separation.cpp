@@ -254,7 +254,7 @@ class SurfaceGap {
       if (!lack_spheres(a_, b_))
         ask_spheres();
       else
-        look_along({pose_.a_from_b.t[0], pose_.a_from_b.t[1], pose_.a_from_b.t[2]});
+        look_along_centres();
       if (overlap_) return answer({.overlap = true});
       if (question_.likely <= question_.enough) {
         Separation result;
@@ -289,6 +289,12 @@ class SurfaceGap {
     overlap_ = nearest.gap < -spheres.off;
     question_.likely = std::max(0.0, nearest.gap) + error_ + spheres.off;
     look_along(nearest.centre_b - nearest.centre_a);
+  }
+  /// The line of centres is a good direction if the solids are beside each other, not nested.
+  void look_along_centres() {
+    const Eigen::Vector3d between(pose_.a_from_b.t);
+    if (between.norm() > std::max(mesh_a_.extent(), pose_.a_from_b.scale * mesh_b_.extent()))
+      look_along(between);
   }
   void look_along(const Eigen::Vector3d& between) {
     if (const double length = between.norm(); length > 0)

@@ -180,14 +180,14 @@ TEST(TimeOfImpact, KnowsNoScaleOrPlace) {
     }
     // Twice as fast in half the time.
     Motion fast = motion;
-    fast.velocity *= 1e6;
-    fast.angular_velocity *= 1e6;
+    fast.velocity *= 0x1p20;
+    fast.angular_velocity *= 0x1p20;
     ImpactSettings settings;
-    settings.duration = 1e-6;
+    settings.duration = 0x1p-20;
     const TimeOfImpact found =
         time_of_impact(PlacedAsset{torus().view(), {}, 1}, {cube().view(), pose, 1}, {{}, fast},
                        settings, workspace());
-    EXPECT_NEAR(1e6 * found.time, want.time, 1e-9);
+    EXPECT_EQ(0x1p20 * found.time, want.time);
   }
 }
 

@@ -377,29 +377,5 @@ TEST(BulletImpact, ABodyThatSlidesKeepsItsSpeed) {
   EXPECT_NEAR(box.getWorldTransform().getOrigin().x(), 5, 0.01);
 }
 
-// A body that is stopped loses what gravity gave it in the time that is lost, and no more: not what
-// the floor bears, and nothing along an axis on which it may not move.
-TEST(BulletImpact, ABodyThatIsStoppedIsNotLifted) {
-  for (const bool floor : {false, true}) {
-    World world;
-    world.contacts.configure(world.world);
-    world.world.addAction(&world.contacts);
-    if (floor) world.add_ground();
-    world.add(std::make_unique<btBoxShape>(btVector3(0.05f, 1, 1)), 0, btVector3(2, 0, 0));
-    btRigidBody& box = world.add(cube_of_side(kSide), 1, btVector3(0, 0, 0.1f));
-    box.setFriction(0);
-    box.setAngularFactor(0);
-    if (!floor) box.setLinearFactor({1, 1, 0});
-    world.step(60, {}, 60);
-    box.setCcdMotionThreshold(0.02f);
-    box.setLinearVelocity({10, 0, 0});
-    double fastest = 0;
-    world.step(
-        60, [&] { fastest = std::max<double>(fastest, box.getLinearVelocity().z()); }, 60);
-    EXPECT_LT(fastest, 1e-3) << floor;
-    EXPECT_LT(box.getWorldTransform().getOrigin().x(), 1.86);
-  }
-}
-
 }  // namespace
 }  // namespace ist::testing
