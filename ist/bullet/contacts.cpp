@@ -111,10 +111,8 @@ Settings Contacts::settings_of(const btCollisionObject& first,
   Settings of = settings;
   if (of_pair) of_pair(first, second, of);
   if (is_valid(of)) return of;
-  warn(
-      "Settings that are no numbers, negative, or of no patches or no depth: the default settings "
-      "are used.",
-      this);
+  warn("Invalid settings (NaN, negative, no patches or no depth): the default settings are used.",
+       this);
   Settings defaults;
   defaults.response = of.response;
   return defaults;

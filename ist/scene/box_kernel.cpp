@@ -139,7 +139,7 @@ HWY_INLINE std::uint32_t meeting(const BoxNode& node, const BoxNode& of, std::ui
 /// Lanes of nodes whose boxes meet that of a leaf, and the leaf: its bodies are looked at later,
 /// many such pairs in a row, so that no branch depends on how many there are of each.
 struct NearLeaves {
-  static constexpr std::size_t kRoom = 64;
+  static constexpr std::size_t kCapacity = 64;
 
   /// Bits of the lanes of `node`.
   HWY_INLINE void add(std::uint32_t leaf, std::uint32_t node, std::uint32_t lanes) {
@@ -154,7 +154,7 @@ struct NearLeaves {
   }
 
   std::size_t count = 0;
-  std::uint32_t leaf_of[kRoom + BoxNode::kLanes], lane_of[kRoom + BoxNode::kLanes];
+  std::uint32_t leaf_of[kCapacity + BoxNode::kLanes], lane_of[kCapacity + BoxNode::kLanes];
 };
 
 HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
@@ -203,7 +203,7 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
     near.count = 0;
   };
   // (64 pairs are the most of two nodes)
-  while (count + 64 + kLanes * (NearLeaves::kRoom + kLanes) <= PairSearch::kMost) {
+  while (count + 64 + kLanes * (NearLeaves::kCapacity + kLanes) <= PairSearch::kMost) {
     if (search.depth == 0) {
       if (search.next == search.end) break;
       const std::uint32_t at = search.next++;
@@ -218,7 +218,7 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
     std::uint32_t i = 0, j = 0, child_a = 0, child_b = 0;
     std::uint64_t left = two.left;
     bool of_leaves = true;
-    for (; left != 0 && of_leaves && near.count <= NearLeaves::kRoom; left &= left - 1) {
+    for (; left != 0 && of_leaves && near.count <= NearLeaves::kCapacity; left &= left - 1) {
       const auto bit = static_cast<std::uint32_t>(std::countr_zero(left));
       i = bit / kLanes, j = bit % kLanes;
       child_a = a.child[i], child_b = b.child[j];
@@ -227,7 +227,7 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
       if (of_leaves) near.add(child_a, child_b, meeting(search.b[child_b], a, i));
     }
     two.left = left;
-    if (near.count > NearLeaves::kRoom) look();
+    if (near.count > NearLeaves::kCapacity) look();
     if (of_leaves) {
       search.depth -= left == 0;
     } else if (a.is_body(i)) {

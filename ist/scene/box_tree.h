@@ -196,25 +196,25 @@ class BoxTree {
   template <class Visit>
   void each_meeting(std::span<const SceneBox> boxes, const Visit& visit) const noexcept {
     if (root_ == kNone) return;
-    constexpr std::uint32_t kRoom = 256;
+    constexpr std::uint32_t kCapacity = 256;
     struct Waiting {
       std::uint32_t node, box;
-    } waiting[kRoom];
+    } waiting[kCapacity];
     std::uint32_t first = 0, end = 0, begun = 0;
     while (first != end || begun < boxes.size()) {
-      while (begun < boxes.size() && end - first < kRoom / 8)
-        waiting[end++ % kRoom] = {root_, begun++};
-      const std::uint32_t at = waiting[first % kRoom].node, k = waiting[first % kRoom].box;
+      while (begun < boxes.size() && end - first < kCapacity / 8)
+        waiting[end++ % kCapacity] = {root_, begun++};
+      const std::uint32_t at = waiting[first % kCapacity].node, k = waiting[first % kCapacity].box;
       ++first;
       const SceneBox& box = boxes[k];
       for (const std::uint32_t lane : set_bits(nodes_[at].meeting(box))) {
         const std::uint32_t child = nodes_[at].child[lane];
         if (nodes_[at].is_body(lane)) {
           visit(k, child);
-        } else if (end - first < kRoom) {
+        } else if (end - first < kCapacity) {
           for (std::size_t line = 0; line < sizeof(BoxNode); line += 64)
             __builtin_prefetch(reinterpret_cast<const char*>(&nodes_[child]) + line);
-          waiting[end++ % kRoom] = {child, k};
+          waiting[end++ % kCapacity] = {child, k};
         } else {
           visit_lanes([&](const BoxNode& node) { return node.meeting(box); },
                       [&](std::uint32_t body) { visit(k, body); }, child);

@@ -10,8 +10,10 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include <ist/asset_layout.h>
+#include "mesh/samples/samples.h"
 #include "support/test_meshes.h"
 
 // The mesh that an asset stores for exact queries, and mesh-only assets.
@@ -54,6 +56,24 @@ TEST(KeptMesh, IsAllOfTheMeshsOwnTriangles) {
     EXPECT_EQ(asset.view().self_overlap_volume(), 0);
     expect_sound(bake_mesh_only(*mesh), *mesh);
   }
+}
+
+/// The flanks of the thread and its crest have blocks of their own, which are thin along their
+/// normals.
+TEST(KeptMesh, BlocksOfAThreadHoldOneFlank) {
+  const Asset asset = bake_mesh_only(closed(make_sample("bolt"), "bolt"));
+  const LevelHeader& level = mesh_of(asset).level[1];
+  const auto* const boxes = at<BoxBlock>(asset.view().header(), level.blocks);
+  const std::uint32_t count = mesh_of(asset).level[0].count;
+  std::vector<double> thick;
+  for (std::uint32_t b = 0; b < count; ++b) {
+    const BoxBlock& box = boxes[b / kWidth];
+    thick.push_back(std::ldexp(double{box.slab_high[b % kWidth]} - double{box.slab_low[b % kWidth]},
+                               asset.view().header().exponent));
+  }
+  std::nth_element(thick.begin(), thick.begin() + count / 2, thick.end());
+  EXPECT_LT(thick[count / 2], 0.2 * kThreadPitch);
+  EXPECT_LT(count * kWidth, 1.2 * double(asset.view().mesh_triangles()));  // nearly full
 }
 
 // If the map into the unit frame is exact, nothing was rounded; otherwise the bound is tight.

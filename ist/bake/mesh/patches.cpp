@@ -172,7 +172,7 @@ class Growth {
         middle[k] += middle_[t][k] / static_cast<float>(patch.triangles.size());
         normal[k] += normal_[t][k];
       }
-    const double length = std::sqrt(dot(normal, normal)) + 1e-30;
+    const double length = std::sqrt(dot(normal, normal)) + 1e-30;  // not 0
     using Score = std::tuple<bool, int, double, std::uint32_t>;
     Score best{true, 4, 0, kNone};
     for (const std::uint32_t v : patch.vertices) {
@@ -186,8 +186,11 @@ class Growth {
         }
         if (patch.vertices.size() + static_cast<std::size_t>(added) > kWidth) continue;
         const double turned = 1 - dot(normal_[t], normal) / length;
-        best = std::min(best, Score{is_over_crease(t, patch, turned), std::max(0, added - last),
-                                    distance2(middle_[t], middle) * (1 + turned), t});
+        Score score{false, std::max(0, added - last), distance2(middle_[t], middle) * (1 + turned),
+                    t};
+        if (!(score < best)) continue;
+        std::get<0>(score) = is_over_crease(t, patch, turned);
+        best = std::min(best, score);
       }
     }
     return std::get<3>(best);
