@@ -334,12 +334,12 @@ class _Pairs:
         return len(self.first)
 
     def ask(self, query, chosen=slice(None), aside=0, **settings):
-        """The query of some of them, in one call. aside: of B, in sizes of A."""
+        """The query of some of them, in one call. aside: of B, in sizes of A; an array, one for each chosen."""
         first = self.first[chosen]
         poses = self.poses_b[chosen]
-        if aside != 0:
+        if np.any(aside):
             poses = poses.copy()
-            poses[:, 4:] += aside * np.array([self.of_a.objects[row].size for row in first])[:, None] * _WAY
+            poses[:, 4:] += (aside * np.array([self.of_a.objects[row].size for row in first]))[:, None] * _WAY
         return query(self.of_a.solids(first), self.of_b.solids(self.second[chosen]), poses,
                      poses_a=self.poses_a[chosen], **settings)
 
@@ -354,9 +354,8 @@ class _Pairs:
         Where faces are flush beside an overlap its slope jumps, and the mean of both sides is that of
         neither face.
         """
-        sides = [self.penetration(chosen, aside) for aside in (-_ASIDE, _ASIDE)]
-        return ((getattr(sides[0], what) + getattr(sides[1], what)) / 2
-                for what in ("volume", "force", "centroid"))
+        both = self.penetration(np.tile(chosen, 2), np.repeat([-_ASIDE, _ASIDE], len(chosen)))
+        return (np.mean(np.split(getattr(both, what), 2), axis=0) for what in ("volume", "force", "centroid"))
 
     def touched(self, chosen, answers, rows):
         """(k, 3): the middle of the faces that lie on each other, or else where solids touch."""

@@ -1,8 +1,9 @@
 #pragma once
 
+#include <setjmp.h>
 #include <ucontext.h>
-#include <algorithm>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <functional>
@@ -36,7 +37,7 @@ class Fibers {
       for (int i = 0; i < Width; ++i) order[i] = i;
       for (int i = Width - 1; i > 0; --i)
         std::swap(order[i], order[static_cast<int>(random_() % static_cast<unsigned>(i + 1))]);
-      for (const int i : order) swapcontext(&main_, &lane_[i]);
+      for (const int i : order) resume(i);
       running = !done_[0];
       for (int i = 1; i < Width; ++i)
         if (done_[i] != done_[0] || (running && call_[i] != call_[0]))
@@ -49,7 +50,7 @@ class Fibers {
     std::uint64_t* slots = slots_[round_ % 2];
     slots[lane] = value;
     call_[lane] = call;
-    swapcontext(&lane_[lane], &main_);
+    suspend(lane);
     return slots;
   }
 
@@ -59,24 +60,37 @@ class Fibers {
     static thread_local Fibers* current = nullptr;
     return current;
   }
-  /// Not inlined: getcontext may return twice, and a caller's variables would not survive that.
+  // Not inlined: getcontext and setjmp return twice, and a caller's variables would not survive that.
+  // A jump makes no system call, as a switch of contexts does.
   [[gnu::noinline]] void prepare(const int lane) {
     if (stack_[lane] == nullptr) stack_[lane] = std::make_unique<char[]>(kStackSize);
-    getcontext(&lane_[lane]);
-    lane_[lane].uc_stack.ss_sp = stack_[lane].get();
-    lane_[lane].uc_stack.ss_size = kStackSize;
-    lane_[lane].uc_link = &main_;
-    makecontext(&lane_[lane], reinterpret_cast<void (*)()>(&Fibers::enter), 1, lane);
+    started_[lane] = false;
+    getcontext(&start_[lane]);
+    start_[lane].uc_stack.ss_sp = stack_[lane].get();
+    start_[lane].uc_stack.ss_size = kStackSize;
+    makecontext(&start_[lane], reinterpret_cast<void (*)()>(&Fibers::enter), 1, lane);
+  }
+  [[gnu::noinline]] void resume(int lane) {
+    if (_setjmp(main_) != 0) return;
+    if (started_[lane]) _longjmp(lane_[lane], 1);
+    started_[lane] = true;
+    setcontext(&start_[lane]);
+  }
+  [[gnu::noinline]] void suspend(int lane) {
+    if (_setjmp(lane_[lane]) == 0) _longjmp(main_, 1);
   }
   static void enter(int lane) {
     Fibers& fibers = *current_fibers();
     (*fibers.body_)(lane);
     fibers.done_[lane] = true;
+    _longjmp(fibers.main_, 1);
   }
 
   std::mt19937 random_;
   const std::function<void(int)>* body_ = nullptr;
-  ucontext_t main_, lane_[Width];
+  ucontext_t start_[Width];
+  jmp_buf main_, lane_[Width];
+  bool started_[Width] = {};
   std::unique_ptr<char[]> stack_[Width];
   int call_[Width] = {};
   bool done_[Width] = {};
