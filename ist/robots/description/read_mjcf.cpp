@@ -474,8 +474,8 @@ class MjcfReader {
     for (const Node& child : node.children) {
       const Attributes& a = child.attributes;
       if (child.name != "joint" || !a.contains("joint2") || value(a, "active") == "false") continue;
-      const std::size_t one = index_named(robot_.joints, value(a, "joint1"));
-      std::size_t by = index_named(robot_.joints, a.at("joint2"));
+      const std::size_t one = index_named(robot_.joints, value(a, "joint1")),
+                        by = index_named(robot_.joints, a.at("joint2"));
       if (one == robot_.joints.size() || by == robot_.joints.size() ||
           !robot_.joints[one].is_free() || robot_.joints[by].motion == RobotJoint::Motion::fixed)
         continue;
@@ -483,24 +483,8 @@ class MjcfReader {
       if (c.size() < 2 || std::any_of(c.begin() + 2, c.end(), [](double x) { return x != 0; }))
         continue;
       // Positions are counted from where the bodies stand in the file.
-      double multiplier = c[1], offset = zeros_[robot_.joints[one].name] + c[0] -
-                                         c[1] * zeros_[robot_.joints[by].name];
-      // All of a chain follow its last.
-      if (const RobotJoint last = robot_.joints[by]; last.mimics != kNone) {
-        offset += multiplier * last.offset;
-        multiplier *= last.multiplier;
-        by = last.mimics;
-      }
-      if (one == by) continue;
-      for (RobotJoint& joint : robot_.joints)
-        if (joint.mimics == one) {
-          joint.mimics = by;
-          joint.offset += joint.multiplier * offset;
-          joint.multiplier *= multiplier;
-        }
-      robot_.joints[one].mimics = by;
-      robot_.joints[one].offset = offset;
-      robot_.joints[one].multiplier = multiplier;
+      follow(robot_.joints, one, by, c[1],
+             zeros_[robot_.joints[one].name] + c[0] - c[1] * zeros_[robot_.joints[by].name]);
     }
   }
 
