@@ -12,6 +12,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <tuple>
 #include <typeinfo>
 
 #include <ist/bullet/convert.h>
@@ -87,6 +88,13 @@ double motion_until_asked(const Contact& contact, const Settings& settings, cons
   return std::min(settings.follow * std::max(spring.rest, mean_depth(contact)), spring.rest);
 }
 
+using Asked = std::tuple<std::size_t, double, Measure>;
+
+/// What decides a contact beside the places of the bodies.
+Asked asked_of(const Settings& settings) {
+  return {settings.patches, settings.thickness, settings.query.measure};
+}
+
 }  // namespace
 
 struct PairAlgorithm::State {
@@ -102,6 +110,7 @@ struct PairAlgorithm::State {
   Places before;  // the shapes' places in the last step, if `has_before`
   Points points;
   Spring spring;  // of the points
+  Asked asked;
   ContactMemory memory;
   ContactForce pushed;
 };
@@ -312,13 +321,14 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   state_->before = {at_first, at_second};
   state_->has_before = true;
   const Spring spring = spring_of(state_->meeting, first, second, settings, step);
-  if (holds && spring.is_like(state_->spring)) {
+  if (holds && spring.is_like(state_->spring) && asked_of(settings) == state_->asked) {
     state_->points.move(*a, *b, step);
   } else {
     Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact, state_->apart);
     state_->points.fill(*a, *b, contact, spring, *m_dispatcher);
     state_->spring = spring;
+    state_->asked = asked_of(settings);
     state_->second_in_first = second_in_first;
     state_->still = std::max(motion_until_asked(contact, settings, spring), contact.clearance);
     state_->apart = state_->points.count() == 0;
