@@ -6,6 +6,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -430,6 +431,14 @@ def test_masses_are_those_of_solids(folder):
     twice = (a[0], a[1] + a[1])
     with pytest.warns(UserWarning, match="coincident triangles removed"):
         assert falls(folder, "twice", twice).body_mass[1] == pytest.approx(2, rel=1e-6)
+
+
+def test_a_body_far_from_the_origin_is_no_warning(folder):
+    spec = mujoco.MjSpec.from_string(CUBE.format(ground=PLANE, height=30))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert ist.mujoco.attach(spec, cache=folder / "cache") == 1
+        spec.compile()
 
 
 def test_other_masses_of_a_body_stay(folder):
