@@ -614,6 +614,18 @@ def test_a_scale_of_each_axis_is_baked(tmp_path):
     assert mujoco.mj_geomDistance(model, data, 0, 1, 1.0, np.zeros(6)) == pytest.approx(.06, abs=2e-3)
 
 
+def test_an_asset_that_lies_elsewhere_is_said(tmp_path, capfd):
+    path = str(tmp_path / "moved.ist")
+    corners = 2 * ist.sample_mesh("cube").vertices * (.05, .04, .03)
+    for moved, said in ((0, False), (.02, True)):
+        ist.bake_mesh_only((corners + (moved, 0, 0), ist.sample_mesh("cube").triangles)).save(path)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            with_instance({"file": path, "scale": "1"})
+        assert any("lies elsewhere than the mesh" in text
+                   for text in [str(one.message) for one in caught] + [capfd.readouterr().err]) == said
+
+
 def test_solids_that_no_measure_serves_collide_as_hulls(tmp_path, capfd):
     ist.bake(ist.sample_mesh("cube"), max_spheres=100, keep_mesh=False).save(tmp_path / "spheres.ist")
     ist.bake_mesh_only(ist.sample_mesh("cube")).save(tmp_path / "mesh.ist")
