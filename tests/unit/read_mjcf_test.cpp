@@ -182,6 +182,17 @@ TEST(Mjcf, AnEmptyRangeIsNoLimit) {
   EXPECT_TRUE(robot.joints[1].taken_as_fixed);
 }
 
+TEST(Mjcf, PathsAreStrippedAndCoefficientsFilledUp) {
+  const RobotModel robot = mjcf(
+      "<compiler strippath='true' meshdir='d'/><asset><mesh name='m' file='a/b.stl'/></asset>"
+      "<worldbody><body><joint name='j'/><geom type='mesh' mesh='m'/><body><joint name='k'/></body>"
+      "</body></worldbody><equality><joint joint1='j' joint2='k' polycoef='0.25'/></equality>");
+  EXPECT_EQ(std::get<LinkMesh>(robot.links[1].collision[0].shape).file, "d/b.stl");
+  EXPECT_EQ(robot.joints[0].offset, 0.25);
+  EXPECT_EQ(robot.joints[0].multiplier, 1);
+  EXPECT_FALSE(robot.joints[0].is_free());
+}
+
 TEST(Mjcf, FlexesAreNamed) {
   const RobotModel robot = mjcf(
       "<worldbody><body><flexcomp name='cloth'/></body></worldbody>"

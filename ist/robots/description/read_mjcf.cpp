@@ -24,11 +24,12 @@ using Eigen::Vector3d;
 using Attributes = std::map<std::string, std::string>;
 
 constexpr const char* kAttributes[] = {
-    "name",  "class",  "childclass", "file",      "type",     "size",     "fromto",   "pos",
-    "quat",  "euler",  "axisangle",  "xyaxes",    "zaxis",    "mesh",     "contype",  "conaffinity",
-    "axis",  "range",  "limited",    "ref",       "scale",    "refpos",   "refquat",  "angle",
-    "model", "joint1", "joint2",     "meshdir",   "assetdir", "eulerseq", "polycoef", "body1",
-    "body2", "active", "autolimits", "coordinate"};
+    "name",       "class",       "childclass", "file",      "type",    "size",   "fromto",
+    "pos",        "quat",        "euler",      "axisangle", "xyaxes",  "zaxis",  "mesh",
+    "contype",    "conaffinity", "axis",       "range",     "limited", "ref",    "scale",
+    "refpos",     "refquat",     "angle",      "model",     "joint1",  "joint2", "meshdir",
+    "assetdir",   "eulerseq",    "polycoef",   "body1",     "body2",   "active", "autolimits",
+    "coordinate", "strippath"};
 
 /// Each is the whole orientation of an element.
 constexpr const char* kTurns[] = {"quat", "euler", "axisangle", "xyaxes", "zaxis"};
@@ -155,6 +156,7 @@ class MjcfReader {
     order_ = value(a, "eulerseq", order_);
     if (order_.size() != 3 || order_.find_first_not_of("xyzXYZ") != std::string::npos)
       fail(node, "eulerseq must be three of x, y, z, X, Y and Z");
+    strip_path_ = value(a, "strippath", strip_path_ ? "true" : "false") == "true";
     auto_limits_ = value(a, "autolimits", auto_limits_ ? "true" : "false") == "true";
   }
 
@@ -198,7 +200,8 @@ class MjcfReader {
 
   void read_mesh(const Node& node) {
     const Attributes a = with_defaults(node, "");
-    const std::string file = value(a, "file");
+    std::string file = value(a, "file");
+    if (strip_path_) file = fs::path(file).filename().string();
     const std::string name = value(a, "name", fs::path(file).stem().string());
     if (meshes_by_name_.contains(name)) fail(node, "duplicates the mesh " + in_quotes(name));
     PlacedLinkShape& shape = meshes_by_name_[name];
@@ -479,8 +482,9 @@ class MjcfReader {
       if (one == robot_.joints.size() || by == robot_.joints.size() ||
           !robot_.joints[one].is_free() || robot_.joints[by].motion == RobotJoint::Motion::fixed)
         continue;
-      const std::vector<double> c = numbers(child, "polycoef", value(a, "polycoef", "0 1 0 0 0"));
-      if (c.size() < 2 || std::any_of(c.begin() + 2, c.end(), [](double x) { return x != 0; }))
+      std::vector<double> c = numbers(child, "polycoef", value(a, "polycoef", "0"));
+      if (c.size() == 1) c.push_back(1);
+      if (c.empty() || std::any_of(c.begin() + 2, c.end(), [](double x) { return x != 0; }))
         continue;
       // Positions are counted from where the bodies stand in the file.
       follow(robot_.joints, one, by, c[1],
@@ -491,7 +495,7 @@ class MjcfReader {
   RobotModel& robot_;
   fs::path folder_;
   std::deque<SourceFile> included_;  ///< being read
-  bool degrees_ = true, auto_limits_ = true;
+  bool degrees_ = true, auto_limits_ = true, strip_path_ = false;
   std::string meshes_, order_ = "xyz";
   std::map<std::string, Class> defaults_;
   std::map<std::string, PlacedLinkShape> meshes_by_name_;
