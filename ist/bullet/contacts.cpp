@@ -129,7 +129,6 @@ Settings Contacts::settings_of(const btCollisionObject& first,
 
 void Contacts::register_with(btCollisionDispatcher& dispatcher) {
   create_.contacts = this;
-  create_.others = dispatcher.getCollisionConfiguration();
   for (int other = 0; other < MAX_BROADPHASE_COLLISION_TYPES; ++other) {
     // Bullet decomposes compounds and queries their children.
     if (other == COMPOUND_SHAPE_PROXYTYPE || other == EMPTY_SHAPE_PROXYTYPE) continue;
@@ -232,7 +231,9 @@ btCollisionAlgorithm* Contacts::CreateFunc::CreateCollisionAlgorithm(
   const btCollisionShape &first = *a->getCollisionShape(), &second = *b->getCollisionShape();
   const Meeting meeting(first, second);
   if (!meeting.has_shape()) {
-    return others->getCollisionAlgorithmCreateFunc(first.getShapeType(), second.getShapeType())
+    return static_cast<btCollisionDispatcher*>(info.m_dispatcher1)
+        ->getCollisionConfiguration()
+        ->getCollisionAlgorithmCreateFunc(first.getShapeType(), second.getShapeType())
         ->CreateCollisionAlgorithm(info, a, b);
   }
   if (!meeting.is_met()) {
