@@ -12,6 +12,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <tuple>
 #include <typeinfo>
 
 #include <ist/bullet/convert.h>
@@ -87,6 +88,13 @@ double motion_until_asked(const Contact& contact, const Settings& settings, cons
   return std::min(settings.follow * std::max(spring.rest, mean_depth(contact)), spring.rest);
 }
 
+using Asked = std::tuple<std::size_t, double, Measure>;
+
+/// What decides a contact beside the places of the bodies.
+Asked asked_of(const Settings& settings) {
+  return {settings.patches, settings.thickness, settings.query.measure};
+}
+
 }  // namespace
 
 struct PairAlgorithm::State {
@@ -102,6 +110,7 @@ struct PairAlgorithm::State {
   Places before;  // the shapes' places in the last step, if `has_before`
   Points points;
   Spring spring;  // of the points
+  Asked asked;
   ContactMemory memory;
   ContactForce pushed;
 };
@@ -120,7 +129,6 @@ Settings Contacts::settings_of(const btCollisionObject& first,
 
 void Contacts::register_with(btCollisionDispatcher& dispatcher) {
   create_.contacts = this;
-  create_.others = dispatcher.getCollisionConfiguration();
   for (int other = 0; other < MAX_BROADPHASE_COLLISION_TYPES; ++other) {
     // Bullet decomposes compounds and queries their children.
     if (other == COMPOUND_SHAPE_PROXYTYPE || other == EMPTY_SHAPE_PROXYTYPE) continue;
@@ -223,7 +231,9 @@ btCollisionAlgorithm* Contacts::CreateFunc::CreateCollisionAlgorithm(
   const btCollisionShape &first = *a->getCollisionShape(), &second = *b->getCollisionShape();
   const Meeting meeting(first, second);
   if (!meeting.has_shape()) {
-    return others->getCollisionAlgorithmCreateFunc(first.getShapeType(), second.getShapeType())
+    return static_cast<btCollisionDispatcher*>(info.m_dispatcher1)
+        ->getCollisionConfiguration()
+        ->getCollisionAlgorithmCreateFunc(first.getShapeType(), second.getShapeType())
         ->CreateCollisionAlgorithm(info, a, b);
   }
   if (!meeting.is_met()) {
@@ -312,13 +322,14 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   state_->before = {at_first, at_second};
   state_->has_before = true;
   const Spring spring = spring_of(state_->meeting, first, second, settings, step);
-  if (holds && spring.is_like(state_->spring)) {
+  if (holds && spring.is_like(state_->spring) && asked_of(settings) == state_->asked) {
     state_->points.move(*a, *b, step);
   } else {
     Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact, state_->apart);
     state_->points.fill(*a, *b, contact, spring, *m_dispatcher);
     state_->spring = spring;
+    state_->asked = asked_of(settings);
     state_->second_in_first = second_in_first;
     state_->still = std::max(motion_until_asked(contact, settings, spring), contact.clearance);
     state_->apart = state_->points.count() == 0;

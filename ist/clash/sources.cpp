@@ -257,8 +257,9 @@ void read_clash_robot(const std::string& path, const RobotOptions& options, Clas
                     "uses these",
                     fmt::join(unseen, ", ")));
   if (!robot->endless.empty())
-    out.notes.push_back(fmt::format("left out, because planes and height fields are no solids: {}",
-                                    fmt::join(robot->endless, ", ")));
+    out.notes.push_back(
+        fmt::format("left out, because planes, height fields and flexes are no solids: {}",
+                    fmt::join(robot->endless, ", ")));
   const PackagePaths paths = package_paths(path, options);
   std::vector<std::size_t> links;
   std::size_t round = 0;

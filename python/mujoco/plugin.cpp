@@ -577,6 +577,30 @@ Triangles mesh_of_model(const mjModel* m, int mesh) {
   return out;
 }
 
+/// Warns if an asset lies elsewhere than a mesh of the model, as one baked from the file of a mesh
+/// with refpos does, or an old one.
+void compare_boxes(const mjModel* m, int mesh, double scale, const char* file, const Tree& tree) {
+  ist_bounds_t box = {};
+  box.size = sizeof box;
+  if (ist_asset_get_bounds(&tree.tree, &box) < 0) return;
+  double size = 0, off = 0;
+  const Triangles own = mesh_of_model(m, mesh);
+  for (size_t k = 0; k < 3; ++k) {
+    const auto along = [k](const auto& a, const auto& b) { return a[k] < b[k]; };
+    const auto [low, high] = std::minmax_element(own.vertices.begin(), own.vertices.end(), along);
+    size = std::max(size, (*high)[k] - (*low)[k]);
+    off = std::max({off, std::abs((*low)[k] - scale * box.lower[k]),
+                    std::abs((*high)[k] - scale * box.upper[k])});
+  }
+  constexpr double kElsewhere = 0.05;
+  if (off > kElsewhere * size)
+    complain_once(("ist.solid: " + std::string(file) + " lies elsewhere than the mesh \"" +
+                   (m->names + m->name_meshadr[mesh]) +
+                   "\": bake it with the mesh's scale, refpos and refquat, and set the config "
+                   "key scale to 1, or use ist.mujoco.attach")
+                      .c_str());
+}
+
 /// Loads the file, or bakes the model's own mesh if there is none, e.g. after a move.
 bool find_tree(const mjModel* m, const char* file, Instance& out) {
   ist_status_t status = IST_OK;
@@ -663,6 +687,10 @@ int init(const mjModel* m, mjData* d, int i) {
         file, s[0], s[1], s[2], s[0], s[1], s[2]);
     return -1;
   }
+  for (int geom = 0; geom < m->ngeom; ++geom)
+    if (const int mesh = m->geom_dataid[geom]; m->geom_plugin[geom] == i && mesh >= 0 && file)
+      compare_boxes(m, mesh, made->scale > 0 ? made->scale : m->mesh_scale[3 * mesh], file,
+                    *made->tree);
   if (made->geom >= 0) {
     const mjtNum quat[4] = {1, 0, 0, 0}, pos[3] = {0, 0, 0};
     made->local = place(m, quat, pos, made->geom, *made);

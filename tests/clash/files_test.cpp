@@ -468,7 +468,7 @@ TEST_F(ClashFiles, RobotsStandWhereTheirJointsAre) {
         "<geom type='plane' size='1 1 1' contype='0' conaffinity='0'/>"
         "<body><geom type='box' size='1 1 1'/></body></worldbody></mujoco>");
   EXPECT_EQ(json("floor.xml", {}, 0)["notes"],
-            Json({"left out, because planes and height fields are no solids: floor"}));
+            Json({"left out, because planes, height fields and flexes are no solids: floor"}));
   write("egg.xml",
         "<mujoco><worldbody><geom type='box' pos='0 0 -5' size='5 5 5'/><body name='egg'>"
         "<freejoint/><geom type='ellipsoid' size='.1 .2 .3' euler='90 0 0'/></body></worldbody>"

@@ -6,6 +6,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -432,6 +433,14 @@ def test_masses_are_those_of_solids(folder):
         assert falls(folder, "twice", twice).body_mass[1] == pytest.approx(2, rel=1e-6)
 
 
+def test_a_body_far_from_the_origin_is_no_warning(folder):
+    spec = mujoco.MjSpec.from_string(CUBE.format(ground=PLANE, height=30))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert ist.mujoco.attach(spec, cache=folder / "cache") == 1
+        spec.compile()
+
+
 def test_other_masses_of_a_body_stay(folder):
     text = CUBE.format(ground=PLANE, height=1).replace('mesh="cube"/></body>', """mesh="cube" density="2000" pos=".1 0 0" euler="30 0 0"/>
         <geom type="box" size=".1 .1 .1" mass="3"/></body>""")
@@ -603,6 +612,18 @@ def test_a_scale_of_each_axis_is_baked(tmp_path):
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert mujoco.mj_geomDistance(model, data, 0, 1, 1.0, np.zeros(6)) == pytest.approx(.06, abs=2e-3)
+
+
+def test_an_asset_that_lies_elsewhere_is_said(tmp_path, capfd):
+    path = str(tmp_path / "moved.ist")
+    corners = 2 * ist.sample_mesh("cube").vertices * (.05, .04, .03)
+    for moved, said in ((0, False), (.02, True)):
+        ist.bake_mesh_only((corners + (moved, 0, 0), ist.sample_mesh("cube").triangles)).save(path)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            with_instance({"file": path, "scale": "1"})
+        assert any("lies elsewhere than the mesh" in text
+                   for text in [str(one.message) for one in caught] + [capfd.readouterr().err]) == said
 
 
 def test_solids_that_no_measure_serves_collide_as_hulls(tmp_path, capfd):

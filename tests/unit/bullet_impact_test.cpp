@@ -286,5 +286,17 @@ TEST(BulletWorld, WarnsOnceOfEach) {
   EXPECT_EQ(warned.size(), 2u);
 }
 
+// A contact that holds is asked anew by what an engine changes.
+TEST(BulletMaterial, ChangesOfTheQueryCountWhileABodyRests) {
+  World world;
+  world.add_ground();
+  world.add(cube_of_side(0.2), 1, btVector3(0, 0, 0.1));
+  world.step(240);
+  ASSERT_EQ(points_of(world), 4u);
+  world.contacts.settings.patches = 3;
+  world.step(1);
+  EXPECT_LE(points_of(world), 3u);
+}
+
 }  // namespace
 }  // namespace ist::testing

@@ -227,6 +227,37 @@ TEST(BulletPartners, AssetsInACompoundFall) {
   EXPECT_NEAR(body.getWorldTransform().getOrigin().z(), 0.5, 0.005);
 }
 
+// What is no Shape though of its type is met by the functions of its own world.
+TEST(BulletPartners, TwoWorldsMayShareContacts) {
+  struct Counting : btDefaultCollisionConfiguration {
+    int asked = 0;
+    btCollisionAlgorithmCreateFunc* getCollisionAlgorithmCreateFunc(int a, int b) override {
+      ++asked;
+      return btDefaultCollisionConfiguration::getCollisionAlgorithmCreateFunc(a, b);
+    }
+  } configurations[2];
+  btCollisionDispatcher one(&configurations[0]), other(&configurations[1]);
+  bullet::Contacts contacts;
+  contacts.register_with(one);
+  contacts.register_with(other);
+  struct Own : btBoxShape {
+    Own() : btBoxShape(btVector3(1, 1, 1)) { m_shapeType = CUSTOM_CONCAVE_SHAPE_TYPE; }
+  } own;
+  btCollisionObject first, second;
+  first.setCollisionShape(&own);
+  second.setCollisionShape(&own);
+  const btTransform at = btTransform::getIdentity();
+  const btCollisionObjectWrapper a(nullptr, &own, &first, at, -1, -1),
+      b(nullptr, &own, &second, at, -1, -1);
+  for (Counting& configuration : configurations) configuration.asked = 0;
+  btCollisionAlgorithm* const algorithm =
+      one.findAlgorithm(&a, &b, nullptr, BT_CONTACT_POINT_ALGORITHMS);
+  EXPECT_GT(configurations[0].asked, 0);
+  EXPECT_EQ(configurations[1].asked, 0);
+  algorithm->~btCollisionAlgorithm();
+  one.freeCollisionAlgorithm(algorithm);
+}
+
 TEST(BulletPartners, WhatCannotBeMetIsToldOnce) {
   const Listen listen;
   World world;

@@ -127,6 +127,79 @@ TEST(Mjcf, FreeBodiesAreTakenAsFixed) {
   }
 }
 
+// Truths by MuJoCo 4.0.0: geom_size, geom_quat, jnt_limited, and mesh vertices in the world.
+TEST(Mjcf, OwnValuesReplaceThoseOfClassesAsInMuJoCo) {
+  const RobotModel robot = mjcf(R"(<default><geom type='box' size='0.1 0.2 0.3'/>
+    <default class='q'><geom quat='0 1 0 0'/></default>
+    <default class='s'><geom euler='30 0 0' size='0.4'/></default></default>
+    <worldbody><body><geom class='q' euler='0 180 0'/><geom class='s' quat='0 0 0 1'/>
+      <geom size='0.5 0.6' class='s'/></body></worldbody>)");
+  const auto& geoms = robot.links[1].collision;
+  ASSERT_EQ(geoms.size(), 3u);
+  EXPECT_LT(geoms[0].rotation.angularDistance(Eigen::Quaterniond(0, 0, 1, 0)), 1e-12);
+  EXPECT_LT(geoms[1].rotation.angularDistance(Eigen::Quaterniond(0, 0, 0, 1)), 1e-12);
+  EXPECT_EQ(std::get<LinkBox>(geoms[1].shape).half_extents, Vector3d(0.4, 0.2, 0.3));
+  EXPECT_EQ(std::get<LinkBox>(geoms[2].shape).half_extents, Vector3d(0.5, 0.6, 0.3));
+}
+
+TEST(Mjcf, BoxesBetweenTwoPointsTurnAsInMuJoCo) {
+  const RobotModel robot =
+      mjcf("<worldbody><geom type='box' fromto='0 0 0 0.3 0.5 0.2' size='0.1'/></worldbody>");
+  const Eigen::Quaterniond truth(0.5812, 0.6978, -0.4187, 0);
+  EXPECT_LT(robot.links[0].collision[0].rotation.angularDistance(truth.normalized()), 1e-3);
+}
+
+TEST(Mjcf, MeshesAreScaledBehindTheirReference) {
+  const std::string placed =
+      "refpos='0.1 0.2 0.3' refquat='0.9 0.1 0.2 0.3'/></asset><worldbody><geom type='mesh' "
+      "mesh='m'/></worldbody>";
+  const auto read = [&](const std::string& scale) {
+    return mjcf("<asset><mesh name='m' file='m.obj' scale='" + scale + "' " + placed)
+        .links[0]
+        .collision[0];
+  };
+  const Eigen::Matrix3d turn =
+      Eigen::Quaterniond(0.9, 0.1, 0.2, 0.3).normalized().conjugate().toRotationMatrix();
+  for (const Vector3d& scale : {Vector3d(2, 2, 2), Vector3d(2, -2, 2), Vector3d(-2, -2, -2)}) {
+    const PlacedLinkShape shape = read(std::to_string(scale.x()) + " " + std::to_string(scale.y()) +
+                                       " " + std::to_string(scale.z()));
+    const Vector3d vertex(1, 2, 3);
+    const Vector3d truth = scale.cwiseProduct(turn * (vertex - Vector3d(0.1, 0.2, 0.3)));
+    EXPECT_LT((shape.rotation * std::get<LinkMesh>(shape.shape).scale.cwiseProduct(vertex) +
+               shape.translation - truth)
+                  .norm(),
+              1e-12);
+  }
+  EXPECT_NE(std::get<LinkFault>(read("1 2 1").shape).what.find("differs by axis"),
+            std::string::npos);
+}
+
+TEST(Mjcf, AnEmptyRangeIsNoLimit) {
+  const RobotModel robot = mjcf(
+      "<worldbody><body><joint name='a' range='0 0'/><joint name='b' type='slide' range='0 0'/>"
+      "</body></worldbody>");
+  EXPECT_EQ(robot.joints[0].upper, std::numbers::pi);
+  EXPECT_TRUE(robot.joints[1].taken_as_fixed);
+}
+
+TEST(Mjcf, PathsAreStrippedAndCoefficientsFilledUp) {
+  const RobotModel robot = mjcf(
+      "<compiler strippath='true' meshdir='d'/><asset><mesh name='m' file='a/b.stl'/></asset>"
+      "<worldbody><body><joint name='j'/><geom type='mesh' mesh='m'/><body><joint name='k'/></body>"
+      "</body></worldbody><equality><joint joint1='j' joint2='k' polycoef='0.25'/></equality>");
+  EXPECT_EQ(std::get<LinkMesh>(robot.links[1].collision[0].shape).file, "d/b.stl");
+  EXPECT_EQ(robot.joints[0].offset, 0.25);
+  EXPECT_EQ(robot.joints[0].multiplier, 1);
+  EXPECT_FALSE(robot.joints[0].is_free());
+}
+
+TEST(Mjcf, FlexesAreNamed) {
+  const RobotModel robot = mjcf(
+      "<worldbody><body><flexcomp name='cloth'/></body></worldbody>"
+      "<deformable><flex name='jelly'/></deformable>");
+  EXPECT_EQ(robot.endless, (std::vector<std::string>{"jelly", "cloth"}));
+}
+
 TEST(Mjcf, NamesAreDecoded) {
   const RobotModel robot = mjcf(
       "<asset><mesh file='a&amp;b.stl'/></asset><worldbody><body name='x&lt;y'>"
@@ -161,7 +234,9 @@ TEST(Mjcf, SaysWhatIsWrongAndWhere) {
   expect("<asset><mesh name='m' file='a.stl'/><mesh name='m' file='b.stl'/></asset>",
          "duplicates the mesh \"m\"");
   expect("<worldbody><geom class='none'/></worldbody>", "its class \"none\" is not defined");
-  expect("<worldbody><frame/></worldbody>", "mj_saveLastXML");
+  for (const char* macro : {"<frame/>", "<composite/>"})
+    expect("<worldbody>" + std::string(macro) + "</worldbody>", "mj_saveLastXML");
+  expect("<compiler coordinate='global'/>", "global coordinates are not read");
   expect("<contact><exclude body1='a' body2='b'/></contact>", "\"a\" is not a body");
 }
 

@@ -51,6 +51,27 @@ std::string error_of(const std::string& inside) {
   return "";
 }
 
+TEST(RobotJoints, AChainOfMimicsFollowsItsLast) {
+  const auto slide = [](const char* name, const char* parent, const char* child,
+                        const std::string& mimic) {
+    return joint(name, "prismatic", parent, child, "<limit lower='-9' upper='9'/>" + mimic);
+  };
+  for (const bool reversed : {false, true}) {
+    const std::string by_b = slide("c", "a", "l3", "<mimic joint='b' multiplier='3' offset='1'/>"),
+                      by_a =
+                          slide("b", "a", "l2", "<mimic joint='a' multiplier='-2' offset='0.5'/>");
+    const RobotModel robot = robot_of(links({"a", "l1", "l2", "l3"}) + slide("a", "a", "l1", "") +
+                                      (reversed ? by_b + by_a : by_a + by_b));
+    const auto frames = link_frames(robot, {0.25, 0, 0});
+    EXPECT_EQ(frames[2].translation().x(), 0.5 - 2 * 0.25) << reversed;
+    EXPECT_EQ(frames[3].translation().x(), 1 + 3 * (0.5 - 2 * 0.25)) << reversed;
+  }
+  EXPECT_NE(error_of(links({"a", "l1", "l2"}) + slide("a", "a", "l1", "<mimic joint='b'/>") +
+                     slide("b", "a", "l2", "<mimic joint='a'/>"))
+                .find("moves on its own"),
+            std::string::npos);
+}
+
 TEST(RobotJoints, MoveLinksAsTheirAxesSay) {
   const RobotModel robot = robot_of(
       links({"a", "b", "c", "d"}) +

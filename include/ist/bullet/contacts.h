@@ -149,7 +149,6 @@ class Contacts : public btActionInterface {
  private:
   struct CreateFunc : btCollisionAlgorithmCreateFunc {
     Contacts* contacts = nullptr;
-    btCollisionConfiguration* others = nullptr;
     btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
                                                    const btCollisionObjectWrapper* a,
                                                    const btCollisionObjectWrapper* b) override;

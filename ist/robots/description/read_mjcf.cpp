@@ -24,11 +24,15 @@ using Eigen::Vector3d;
 using Attributes = std::map<std::string, std::string>;
 
 constexpr const char* kAttributes[] = {
-    "name",     "class",       "childclass", "file",      "type",    "size",   "fromto",
-    "pos",      "quat",        "euler",      "axisangle", "xyaxes",  "zaxis",  "mesh",
-    "contype",  "conaffinity", "axis",       "range",     "limited", "ref",    "scale",
-    "refpos",   "refquat",     "angle",      "model",     "joint1",  "joint2", "meshdir",
-    "assetdir", "eulerseq",    "polycoef",   "body1",     "body2",   "active", "autolimits"};
+    "name",       "class",       "childclass", "file",      "type",    "size",   "fromto",
+    "pos",        "quat",        "euler",      "axisangle", "xyaxes",  "zaxis",  "mesh",
+    "contype",    "conaffinity", "axis",       "range",     "limited", "ref",    "scale",
+    "refpos",     "refquat",     "angle",      "model",     "joint1",  "joint2", "meshdir",
+    "assetdir",   "eulerseq",    "polycoef",   "body1",     "body2",   "active", "autolimits",
+    "coordinate", "strippath"};
+
+/// Each is the whole orientation of an element.
+constexpr const char* kTurns[] = {"quat", "euler", "axisangle", "xyaxes", "zaxis"};
 
 /// An element, with those of included files in their places.
 struct Node {
@@ -47,8 +51,12 @@ class MjcfReader {
     folder_ = path.parent_path();
     const Node root = tree_of(robot_.file, 0).front();
     robot_.name = value(root.attributes, "model", path.stem().string());
-    for (const Node& node : root.children)
+    for (const Node& node : root.children) {
       if (node.name == "compiler") read_compiler(node);
+      if (node.name != "deformable") continue;
+      for (const Node& one : node.children)
+        if (one.name == "flex") robot_.endless.push_back(value(one.attributes, "name", "flex"));
+    }
     defaults_[""];
     for (const Node& node : root.children)
       if (node.name == "default") read_defaults(node, "");
@@ -138,11 +146,17 @@ class MjcfReader {
 
   void read_compiler(const Node& node) {
     const Attributes& a = node.attributes;
+    if (value(a, "coordinate") == "global")
+      fail(
+          node,
+          "global coordinates are not read, nor by MuJoCo. Save the model from MuJoCo 2.3.3, which "
+          "resolves them");
     degrees_ = value(a, "angle", degrees_ ? "degree" : "radian") == "degree";
     meshes_ = value(a, "meshdir", value(a, "assetdir", meshes_));
     order_ = value(a, "eulerseq", order_);
     if (order_.size() != 3 || order_.find_first_not_of("xyzXYZ") != std::string::npos)
       fail(node, "eulerseq must be three of x, y, z, X, Y and Z");
+    strip_path_ = value(a, "strippath", strip_path_ ? "true" : "false") == "true";
     auto_limits_ = value(a, "autolimits", auto_limits_ ? "true" : "false") == "true";
   }
 
@@ -152,8 +166,7 @@ class MjcfReader {
     const std::string name = value(node.attributes, "class", parent.empty() ? "main" : "");
     Class own = defaults_[parent];
     for (const Node& child : node.children)
-      for (const auto& [key, text] : child.attributes)
-        if (child.name != "default") own[child.name][key] = text;
+      if (child.name != "default") replace(child.attributes, own[child.name]);
     defaults_[name] = own;
     if (parent.empty()) defaults_[""] = own;  // the class at the top, whatever it is called
     for (const Node& child : node.children)
@@ -166,13 +179,29 @@ class MjcfReader {
     if (found == defaults_.end()) fail(node, "its class " + in_quotes(name) + " is not defined");
     const auto kind = found->second.find(node.name);
     Attributes all = kind == found->second.end() ? Attributes{} : kind->second;
-    for (const auto& [key, text] : node.attributes) all[key] = text;
+    replace(node.attributes, all);
     return all;
+  }
+
+  /// Any orientation replaces another; a size replaces as many numbers as it has.
+  static void replace(const Attributes& by, Attributes& all) {
+    if (std::any_of(std::begin(kTurns), std::end(kTurns),
+                    [&](const char* key) { return by.contains(key); }))
+      for (const char* const key : kTurns) all.erase(key);
+    std::size_t sizes = 0;
+    std::string rest;
+    for_words(value(by, "size"), [&](std::string_view) { ++sizes; });
+    for_words(value(all, "size"), [&](std::string_view word) {
+      if (sizes > 0 && sizes-- > 0) return;
+      (rest += ' ') += word;
+    });
+    for (const auto& [key, text] : by) all[key] = key == "size" ? text + rest : text;
   }
 
   void read_mesh(const Node& node) {
     const Attributes a = with_defaults(node, "");
-    const std::string file = value(a, "file");
+    std::string file = value(a, "file");
+    if (strip_path_) file = fs::path(file).filename().string();
     const std::string name = value(a, "name", fs::path(file).stem().string());
     if (meshes_by_name_.contains(name)) fail(node, "duplicates the mesh " + in_quotes(name));
     PlacedLinkShape& shape = meshes_by_name_[name];
@@ -184,11 +213,19 @@ class MjcfReader {
     mesh.file = (fs::path(meshes_) / file).string();
     mesh.scale = vector(node, a, "scale", Vector3d::Ones());
     shape.shape = mesh;
-    shape.translation = -vector(node, a, "refpos", Vector3d::Zero());
-    if (a.contains("refquat")) {
-      shape.rotation = quaternion(node, a.at("refquat")).conjugate();
-      shape.translation = shape.rotation * shape.translation;
-    }
+    // MuJoCo scales the mesh last; its mirrors are exchanged with the turn.
+    Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+    if (a.contains("refquat"))
+      turn = quaternion(node, a.at("refquat")).conjugate().toRotationMatrix();
+    const Vector3d mirror = mesh.scale.cwiseSign();
+    shape.translation =
+        -mesh.scale.cwiseProduct(turn * vector(node, a, "refpos", Vector3d::Zero()));
+    shape.rotation = mirror.asDiagonal() * turn * mirror.asDiagonal();
+    const Vector3d size = mesh.scale.cwiseAbs();
+    if (!turn.isIdentity(0) && size.maxCoeff() > (1 + 1e-12) * size.minCoeff())
+      shape.shape = LinkFault{node.where +
+                              ": a scale that differs by axis is not read with a refquat. Write "
+                              "the turned vertices into a file"};
   }
 
   Eigen::Quaterniond quaternion(const Node& node, const std::string& text) const {
@@ -303,10 +340,11 @@ class MjcfReader {
     joint.lower = -std::numbers::pi;
     joint.upper = std::numbers::pi;
     const std::string limited = value(a, "limited", "auto");
+    const std::vector<double> range = numbers(node, "range", value(a, "range"));
+    const bool empty = range.size() == 2 && range[0] == range[1];
     const bool has_range =
-        a.contains("range") && (limited == "true" || (limited == "auto" && auto_limits_));
+        !range.empty() && (limited == "true" || (limited == "auto" && auto_limits_ && !empty));
     if (has_range && type != "ball") {
-      const std::vector<double> range = numbers(node, "range", a.at("range"));
       if (range.size() != 2 || range[0] > range[1])
         fail(node, "range must have 2 numbers, the smaller first");
       joint.lower = type == "hinge" ? angle(range[0]) : range[0];
@@ -346,7 +384,10 @@ class MjcfReader {
     for (const Node& child : node.children) {
       if (child.name == "geom") read_geom(child, link, own_class);
       if (child.name == "body") read_body(child, link, own_class);
-      if (child.name == "frame" || child.name == "replicate" || child.name == "attach")
+      if (child.name == "flexcomp")
+        robot_.endless.push_back(value(child.attributes, "name", child.name));
+      if (child.name == "frame" || child.name == "replicate" || child.name == "attach" ||
+          child.name == "composite")
         fail(child, "is not read. Save the model from MuJoCo (mj_saveLastXML), which resolves it");
     }
   }
@@ -387,7 +428,7 @@ class MjcfReader {
         const std::vector<double> v = numbers(node, "fromto", a.at("fromto"));
         if (v.size() != 6 || size.empty()) fail(node, "fromto must have 6 numbers, and size one");
         const Vector3d begin(v[0], v[1], v[2]), end(v[3], v[4], v[5]);
-        at = Eigen::Translation3d((begin + end) / 2) * turn_from_z(end - begin);
+        at = Eigen::Translation3d((begin + end) / 2) * turn_from_z(begin - end);
         const double half = (end - begin).norm() / 2;
         size = type == "box" || type == "ellipsoid" ? std::vector<double>{size[0], size[0], half}
                                                     : std::vector<double>{size[0], half};
@@ -436,40 +477,25 @@ class MjcfReader {
     for (const Node& child : node.children) {
       const Attributes& a = child.attributes;
       if (child.name != "joint" || !a.contains("joint2") || value(a, "active") == "false") continue;
-      const std::size_t one = index_named(robot_.joints, value(a, "joint1"));
-      std::size_t by = index_named(robot_.joints, a.at("joint2"));
+      const std::size_t one = index_named(robot_.joints, value(a, "joint1")),
+                        by = index_named(robot_.joints, a.at("joint2"));
       if (one == robot_.joints.size() || by == robot_.joints.size() ||
           !robot_.joints[one].is_free() || robot_.joints[by].motion == RobotJoint::Motion::fixed)
         continue;
-      const std::vector<double> c = numbers(child, "polycoef", value(a, "polycoef", "0 1 0 0 0"));
-      if (c.size() < 2 || std::any_of(c.begin() + 2, c.end(), [](double x) { return x != 0; }))
+      std::vector<double> c = numbers(child, "polycoef", value(a, "polycoef", "0"));
+      if (c.size() == 1) c.push_back(1);
+      if (c.empty() || std::any_of(c.begin() + 2, c.end(), [](double x) { return x != 0; }))
         continue;
       // Positions are counted from where the bodies stand in the file.
-      double multiplier = c[1], offset = zeros_[robot_.joints[one].name] + c[0] -
-                                         c[1] * zeros_[robot_.joints[by].name];
-      // All of a chain follow its last.
-      if (const RobotJoint last = robot_.joints[by]; last.mimics != kNone) {
-        offset += multiplier * last.offset;
-        multiplier *= last.multiplier;
-        by = last.mimics;
-      }
-      if (one == by) continue;
-      for (RobotJoint& joint : robot_.joints)
-        if (joint.mimics == one) {
-          joint.mimics = by;
-          joint.offset += joint.multiplier * offset;
-          joint.multiplier *= multiplier;
-        }
-      robot_.joints[one].mimics = by;
-      robot_.joints[one].offset = offset;
-      robot_.joints[one].multiplier = multiplier;
+      follow(robot_.joints, one, by, c[1],
+             zeros_[robot_.joints[one].name] + c[0] - c[1] * zeros_[robot_.joints[by].name]);
     }
   }
 
   RobotModel& robot_;
   fs::path folder_;
   std::deque<SourceFile> included_;  ///< being read
-  bool degrees_ = true, auto_limits_ = true;
+  bool degrees_ = true, auto_limits_ = true, strip_path_ = false;
   std::string meshes_, order_ = "xyz";
   std::map<std::string, Class> defaults_;
   std::map<std::string, PlacedLinkShape> meshes_by_name_;

@@ -34,10 +34,7 @@ class SdfReader final : RobotXml {
     for (const std::uint32_t e : joints) {
       const std::uint32_t axis = xml_.child(e, "axis");
       const std::uint32_t mimic = axis == kNoTag ? kNoTag : xml_.child(axis, "mimic");
-      if (mimic == kNoTag) continue;
-      RobotJoint& joint = robot_.joints[joint_.at(name_of(e))];
-      read_mimic(mimic, joint, [&](std::size_t other) { return robot_.joints[other].is_free(); });
-      joint.offset -= joint.multiplier * real(mimic, "reference", 0);
+      if (mimic != kNoTag) read_mimic(mimic, joint_.at(name_of(e)));
     }
     require_tree(model);
   }

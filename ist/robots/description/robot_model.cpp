@@ -29,8 +29,7 @@ class UrdfReader final : RobotXml {
     for (std::size_t j = 0; j < joints.size(); ++j)
       if (const std::uint32_t mimic = xml_.child(joints[j], "mimic");
           mimic != kNoTag && robot_.joints[j].motion != RobotJoint::Motion::fixed)
-        read_mimic(mimic, robot_.joints[j],
-                   [&](std::size_t other) { return xml_.child(joints[other], "mimic") == kNoTag; });
+        read_mimic(mimic, j);
     require_tree(0);
   }
 

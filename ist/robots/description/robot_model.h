@@ -101,7 +101,7 @@ struct RobotModel {
       joint_of;                    ///< of each link, the joint it is the child of; kNone: the root
   std::vector<std::size_t> order;  ///< links, parents before children
   std::vector<std::pair<std::size_t, std::size_t>> excluded;  ///< links that the file ignores
-  std::vector<std::string> endless;  ///< planes and height fields, which no link has
+  std::vector<std::string> endless;  ///< planes, height fields and flexes, which no link has
 };
 
 /// The index of the link or joint of that name; the number of items if there is none.
@@ -143,9 +143,9 @@ RobotModel read_sdf(SourceFile file);
 ///
 /// The world is the first link. A body with several joints gets a link without shapes for each but
 /// the last. Free joints and slides without a range are taken as fixed, balls as three hinges.
-/// Geoms that collide with nothing (contype and conaffinity 0) are visual; planes and height fields
-/// are passed over. Meshes are taken as they are, where MuJoCo collides their convex hull. Geoms of
-/// other kinds become a LinkFault. Throws Error.
+/// Geoms that collide with nothing (contype and conaffinity 0) are visual; planes, height fields
+/// and flexes are passed over. Meshes are taken as they are, where MuJoCo collides their convex
+/// hull. Geoms of other kinds become a LinkFault. Throws Error.
 RobotModel read_mjcf(SourceFile file);
 
 }  // namespace ist

@@ -44,6 +44,28 @@ inline std::string name_fault(std::string_view name) {
   return control ? "its name contains control characters. Rename it" : "";
 }
 
+/// Makes a joint stand at multiplier · (another's position) + offset. All of a chain follow its
+/// last. False: the joint would follow itself.
+inline bool follow(std::vector<RobotJoint>& joints, std::size_t one, std::size_t by,
+                   double multiplier, double offset) {
+  if (const RobotJoint& last = joints[by]; last.mimics != kNone) {
+    offset += multiplier * last.offset;
+    multiplier *= last.multiplier;
+    by = last.mimics;
+  }
+  if (one == by) return false;
+  for (RobotJoint& joint : joints)
+    if (joint.mimics == one) {
+      joint.mimics = by;
+      joint.offset += joint.multiplier * offset;
+      joint.multiplier *= multiplier;
+    }
+  joints[one].mimics = by;
+  joints[one].offset = offset;
+  joints[one].multiplier = multiplier;
+  return true;
+}
+
 /// What the readers of URDF and SDF share: values, shapes, joints' ends and limits, and the tree of
 /// links. An element states a value by name: URDF in an attribute, SDF in a child.
 class RobotXml {
@@ -198,19 +220,18 @@ class RobotXml {
     robot_.joints.push_back(std::move(joint));
   }
 
-  /// `mimic`: the element that names another joint; `moves`: whether that joint moves by itself.
-  template <class Moves>
-  void read_mimic(std::uint32_t mimic, RobotJoint& joint, const Moves& moves) const {
+  /// `mimic`: the element that names another joint.
+  void read_mimic(std::uint32_t mimic, std::size_t joint) {
     const std::string name = decoded(xml_.attribute(mimic, "joint"));
     const auto found = joint_.find(name);
     if (found == joint_.end())
       xml_.fail(mimic,
                 "no joint is called " + in_quotes(name) + ". Name one that moves on its own");
-    if (name == joint.name || !moves(found->second))
+    const double multiplier = real(mimic, "multiplier", 1);
+    if (robot_.joints[found->second].taken_as_fixed ||
+        !follow(robot_.joints, joint, found->second, multiplier,
+                real(mimic, "offset", 0) - multiplier * real(mimic, "reference", 0)))
       xml_.fail(mimic, in_quotes(name) + " is not a joint that moves on its own");
-    joint.mimics = found->second;
-    joint.multiplier = real(mimic, "multiplier", 1);
-    joint.offset = real(mimic, "offset", 0);
   }
 
   /// Requires that every link but one is the child of one joint, and none its own ancestor.
