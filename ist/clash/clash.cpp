@@ -243,6 +243,9 @@ std::vector<std::pair<std::size_t, std::size_t>> candidates(const PlacedParts& p
     for (std::uint32_t i = 0; i < parts.size(); ++i)
       scene.add({.number = i, .solid = parts[i].part.solid});
     const SceneStep step = scene.step();
+    if (!step.refused.empty())
+      throw Error(parts[step.refused.front()].part.name +
+                  ": its box, with clearance and tolerance, reaches beyond 1e37 u");
     complete = !step.pairs_exceeded;
     for (const ScenePair& pair : step.pairs)
       if (parts[pair.a].box.intersects(parts[pair.b].box) && !(ignored && ignored(pair.a, pair.b)))

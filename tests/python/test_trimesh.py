@@ -220,6 +220,10 @@ def test_mistakes_are_told():
         with pytest.raises(ValueError, match="transform"):
             m.set_transform("a", wrong)
     assert m.min_distance_single(Box()) == 2  # where it was
+    for call in (lambda: m.in_collision_single(Box(), at(1e38)), lambda: m.min_distance_single(Box(), at(1e38)),
+                 lambda: m.set_transform("a", at(1e38)) or m.in_collision_internal()):
+        with pytest.raises(ValueError, match="reaches beyond 1e37 u"):  # no scene holds it
+            call()
 
 
 def test_the_face_of_a_contact():
