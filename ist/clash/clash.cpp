@@ -263,8 +263,11 @@ struct Sums {
   double volume = 0, area = 0;  ///< [u³], [u²] the patches' areas
   Vector3d force = Vector3d::Zero();
 
-  /// True if more than a quarter of the faces' area points in one direction; those of a pin cancel.
-  bool has_exit() const { return force.norm() > area / 4; }
+  /// True if more than a quarter of the faces' area points in one direction; those of a pin cancel,
+  /// and those of a bar through a plate but for rounding.
+  bool has_exit() const {
+    return force.norm() > std::max(area / 4, 1e-9 * std::cbrt(volume * volume));
+  }
   double depth() const { return volume / (has_exit() ? force.norm() : area); }
 };
 

@@ -52,6 +52,17 @@ def test_what_collides():
     assert m.in_collision_other(n, return_names=True) == (True, {("b", "d")})
 
 
+def test_a_bar_through_a_plate():
+    bar, plate = Box(), Box()
+    bar.vertices, plate.vertices = bar.vertices * (1, 2, 10), plate.vertices * (8, 9, 2)
+    m = CollisionManager()
+    m.add_object("bar", bar)
+    m.add_object("plate", plate, at(0.3, 0.7, 1.1))
+    contact, = m.in_collision_internal(return_data=True)[1]
+    assert contact.volume == pytest.approx(4) and contact.normal.tolist() == [0, 0, 0]  # no way leads out
+    assert m.min_distance_internal() == pytest.approx(-np.cbrt(4))
+
+
 def test_how_far():
     m = CollisionManager()
     assert m.min_distance_single(Box()) == np.inf and m.min_distance_internal() == np.inf
