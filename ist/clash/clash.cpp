@@ -264,10 +264,8 @@ struct Sums {
   Vector3d force = Vector3d::Zero();
 
   /// True if more than a quarter of the faces' area points in one direction; those of a pin cancel,
-  /// and those of a bar through a plate but for rounding.
-  bool has_exit() const {
-    return force.norm() > std::max(area / 4, 1e-9 * std::cbrt(volume * volume));
-  }
+  /// and those of a bar through a plate, whose area is 0.
+  bool has_exit() const { return area > 0 && force.norm() > area / 4; }
   double depth() const { return volume / (has_exit() ? force.norm() : area); }
 };
 
