@@ -81,7 +81,7 @@ typedef struct ist_scene_rule {
 /* The rule for bodies of two groups, whichever is which. All pairs are queried again. */
 ist_status_t ist_scene_set_rule(ist_scene_t* scene, uint32_t group_a, uint32_t group_b,
                                 const ist_scene_rule_t* rule);
-/* joined, not 0: as long as both are there they do not meet. */
+/* joined, not 0: until one of them is removed they do not meet. */
 ist_status_t ist_scene_join(ist_scene_t* scene, uint32_t a, uint32_t b, uint32_t joined);
 /* Pairs for which it returns 0 do not meet. It may be called by the thread of a step alone, and
  * must not change from call to call while neither body moves. Null: all meet. */

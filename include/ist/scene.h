@@ -118,7 +118,7 @@ class Scene {
   /// Throws Error for a number that is taken, a group that is too large or a full scene; a pose
   /// that is not usable is refused in the step.
   void add(const SceneBody& body);
-  /// False: there is none. Its pairs end in the next step.
+  /// False: there is none. Its pairs end in the next step, its exclusions at once.
   bool remove(std::uint32_t number) noexcept;
   /// False: there is none.
   bool set_pose(std::uint32_t number, const Pose& pose) noexcept;

@@ -243,6 +243,9 @@ std::vector<std::pair<std::size_t, std::size_t>> candidates(const PlacedParts& p
     for (std::uint32_t i = 0; i < parts.size(); ++i)
       scene.add({.number = i, .solid = parts[i].part.solid});
     const SceneStep step = scene.step();
+    if (!step.refused.empty())
+      throw Error(parts[step.refused.front()].part.name +
+                  ": its box, with clearance and tolerance, reaches beyond 1e37 u");
     complete = !step.pairs_exceeded;
     for (const ScenePair& pair : step.pairs)
       if (parts[pair.a].box.intersects(parts[pair.b].box) && !(ignored && ignored(pair.a, pair.b)))
@@ -260,8 +263,9 @@ struct Sums {
   double volume = 0, area = 0;  ///< [u³], [u²] the patches' areas
   Vector3d force = Vector3d::Zero();
 
-  /// True if more than a quarter of the faces' area points in one direction; those of a pin cancel.
-  bool has_exit() const { return force.norm() > area / 4; }
+  /// True if more than a quarter of the faces' area points in one direction; those of a pin cancel,
+  /// and those of a bar through a plate, whose area is 0.
+  bool has_exit() const { return area > 0 && force.norm() > area / 4; }
   double depth() const { return volume / (has_exit() ? force.norm() : area); }
 };
 

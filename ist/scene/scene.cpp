@@ -69,6 +69,10 @@ bool Scene::remove(std::uint32_t number) noexcept {
   impl_->take_out(at);
   impl_->note_moved(at);
   impl_->removed.push_back(at);
+  std::erase_if(impl_->excluded, [&](std::uint64_t key) {
+    const ScenePairName two = name_of(key);
+    return two.a == number || two.b == number;
+  });
   return true;
 }
 

@@ -42,7 +42,8 @@ class _Data:
 class ContactData(_Data):
     """A contact of two objects.
 
-    normal: (3,) unit, from the first object to the second; zero where they touch in a point or edge.
+    normal: (3,) unit, from the first object to the second; zero where they touch in a point or edge, or
+    where no way leads out, as of a bar through a plate.
     point: (3,) [u] world; NaN where they touch in points or edges alone and none of them is found.
     depth: [u] ≥ 0. volume: [u³] of the overlap there. touching: whether they touch, and do not overlap.
     """
@@ -422,10 +423,15 @@ def _parts(pairs, i):
     orders = [np.argsort(-side[2][:count]) for side in sides]
     force, volume, point = (sum(side[k][order] for side, order in zip(sides, orders)) / len(sides)
                             for k in (1, 2, 3))
-    area = np.linalg.norm(force, axis=1)
-    normal, depth = force / np.maximum(area, 1e-300)[:, None], _depths(volume, area)
+    normal, depth = _directions(force, volume), _depths(volume, np.linalg.norm(force, axis=1))
     return [(i, ContactData(pairs, i, normal[k], point[k], float(depth[k]), float(volume[k])))
             for k in range(count)]
+
+
+def _directions(force, volume):
+    """Unit; zero where forces cancel but for rounding, as of a bar through a plate."""
+    area = np.linalg.norm(force, axis=1)[:, None]
+    return np.where(area > 1e-9 * np.cbrt(volume**2)[:, None], force / np.maximum(area, 1e-300), 0)
 
 
 def _depths(volume, area):
@@ -478,11 +484,10 @@ def _deepest(pairs):
             if len(of) == 0:
                 break
             volume, force, point = pairs.overlaps(of)
-            area = np.linalg.norm(force, axis=1)
-            depth = _depths(volume, area)
+            depth = _depths(volume, np.linalg.norm(force, axis=1))
             k = int(depth.argmax())
             if -depth[k] < best:
-                half = 0.5 * depth[k] * force[k] / max(area[k], 1e-300)
+                half = 0.5 * depth[k] * _directions(force, volume)[k]
                 best, nearest = -depth[k], (pairs, int(of[k]), (point[k] + half, point[k] - half))
         begin, size = begin + size, 4 * size
     return best, nearest

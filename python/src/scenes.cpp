@@ -372,6 +372,7 @@ void add_scenes(py::module_& module) {
           "_step_pairs",  // for ist.trimesh: (2, n), only the pairs of a step
           [](PyScene& self, const py::object& poses, const py::object& numbers) {
             const SceneStep found = ask_step(self, poses, numbers);
+            if (!found.refused.empty()) throw value_error("an object reaches beyond 1e37 u");
             const std::size_t count = found.pairs.size();
             const Column<std::int64_t> out({2, count});
             for (std::size_t i = 0; i < count; ++i) {
@@ -385,15 +386,17 @@ void add_scenes(py::module_& module) {
           "_near",  // for ist.trimesh: bodies whose boxes are within `margin` of the solid's
           [](const PyScene& self, const py::object& solid, const py::object& pose, double margin) {
             const Pose at = take_pose(pose, 1);
-            const WorldBox box =
-                solid_box(tree_of(solid, "solid")).placed(Rotation::of(at.q), at.t, margin);
+            const SolidBox own = solid_box(tree_of(solid, "solid"));
+            if (!own.placed(Rotation::of(at.q), at.t, 0).fits())
+              throw value_error("an object reaches beyond 1e37 u");
+            const WorldBox box = own.placed(Rotation::of(at.q), at.t, margin);
             return in_box(self, vector(box.low), vector(box.high)).handed_out();
           },
           py::arg("solid"), py::arg("pose"), py::arg("margin"))
       .def(
           "exclude",
           [](PyScene& self, std::uint32_t a, std::uint32_t b) { self.scene.exclude(a, b); },
-          py::arg("a"), py::arg("b"), "Bodies that are joined do not meet.")
+          py::arg("a"), py::arg("b"), "Bodies that are joined do not meet, until one is removed.")
       .def(
           "include",
           [](PyScene& self, std::uint32_t a, std::uint32_t b) { self.scene.include(a, b); },

@@ -199,6 +199,26 @@ TEST(ClashPairs, ADeepCornerIsNoTouchHoweverLargeTheFaces) {
 }
 
 // If facets of both meet along their edges, some parts of the overlap are rounding.
+// The volume changes in no direction: rounding alone has one.
+TEST(ClashPairs, ABarThroughAPlateHasNoDirection) {
+  std::mt19937_64 random(13);
+  for (int i = 0; i < 24; ++i) {
+    SCOPED_TRACE(i);
+    const Eigen::Quaterniond turn =
+        i % 2 == 1 ? testing::random_turn(random) : Eigen::Quaterniond::Identity();
+    const double size = std::pow(10.0, i % 4);
+    const Asset bar = testing::surface(box({-1, -2, -5}, {1, 2, 5})),
+                plate = testing::surface(box({-4 * size, -5 * size, -1}, {4 * size, 5 * size, 1}));
+    const std::vector<Clash> found = clashes(
+        {{"bar", {bar.view(), testing::turned(turn, {}), 1}, kFloat64},
+         {"plate", {plate.view(), testing::turned(turn, {.t = {0.3, 0.7, 1.1}}), 1}, kFloat64}});
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_LE(found[0].volume_min, 16);
+    EXPECT_GE(found[0].volume_max, 16);
+    EXPECT_EQ(found[0].direction, Vector3d::Zero());
+  }
+}
+
 TEST(ClashPairs, ABallInItsRaceIsAsDeepAsItsFacets) {
   constexpr double kRadius = 3, kRace = 15;
   using Counts = std::array<std::uint32_t, 4>;

@@ -433,6 +433,21 @@ TEST(Scene, TouchingBlocksMeetAndApartOnesComeWithinTheMargin) {
   EXPECT_EQ(apart.ended[0].b, 5u);
 }
 
+TEST(Scene, ExclusionsEndWithTheirBodies) {
+  Scene scene;
+  scene.set_rule(0, 0, exact_rule());
+  for (const std::uint32_t number : {0u, 1u, 2u}) scene.add(block_at(number, 0));
+  scene.exclude(0, 1);
+  scene.exclude(2, 0);
+  EXPECT_EQ(scene.step().pairs.size(), 1u);
+  scene.remove(1);
+  scene.add(block_at(1, 0));  // another body of the same number
+  const ist::SceneStep step = scene.step();
+  ASSERT_EQ(step.pairs.size(), 2u);
+  EXPECT_EQ(step.pairs[0].b, 1u);  // 0 and 1; 0 and 2 are still excluded
+  EXPECT_EQ(step.pairs[1].a, 1u);
+}
+
 TEST(Scene, PairsWithoutRoomAreToldAndAskedAgain) {
   Scene scene({.max_bodies = 8, .max_pairs = 2});
   scene.set_rule(0, 0, exact_rule());

@@ -69,3 +69,5 @@ def test_faults_floats_and_mistakes():
         ist.clash([CUBE, CUBE], names=["a", "a"])
     with pytest.raises(ValueError, match=r"poses\[1\]: tx is nan"):
         ist.clash([CUBE, CUBE], [at(0), at(np.nan)])
+    with pytest.raises(ist.Error, match="reaches beyond 1e37 u"):
+        ist.clash([CUBE, CUBE], [[1, 0, 0, 0, 1e38, 0, 0]] * 2)

@@ -52,6 +52,17 @@ def test_what_collides():
     assert m.in_collision_other(n, return_names=True) == (True, {("b", "d")})
 
 
+def test_a_bar_through_a_plate():
+    bar, plate = Box(), Box()
+    bar.vertices, plate.vertices = bar.vertices * (1, 2, 10), plate.vertices * (8, 9, 2)
+    m = CollisionManager()
+    m.add_object("bar", bar)
+    m.add_object("plate", plate, at(0.3, 0.7, 1.1))
+    contact, = m.in_collision_internal(return_data=True)[1]
+    assert contact.volume == pytest.approx(4) and contact.normal.tolist() == [0, 0, 0]  # no way leads out
+    assert m.min_distance_internal() == pytest.approx(-np.cbrt(4))
+
+
 def test_how_far():
     m = CollisionManager()
     assert m.min_distance_single(Box()) == np.inf and m.min_distance_internal() == np.inf
@@ -220,6 +231,10 @@ def test_mistakes_are_told():
         with pytest.raises(ValueError, match="transform"):
             m.set_transform("a", wrong)
     assert m.min_distance_single(Box()) == 2  # where it was
+    for call in (lambda: m.in_collision_single(Box(), at(1e38)), lambda: m.min_distance_single(Box(), at(1e38)),
+                 lambda: m.set_transform("a", at(1e38)) or m.in_collision_internal()):
+        with pytest.raises(ValueError, match="reaches beyond 1e37 u"):  # no scene holds it
+            call()
 
 
 def test_the_face_of_a_contact():

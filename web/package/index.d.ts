@@ -573,7 +573,7 @@ export class Scene {
       margin?: number;
     },
   ): void;
-  /** Bodies that are joined do not meet, until include(). */
+  /** Bodies that are joined do not meet, until include() or until one of them is removed. */
   exclude(a: number, b: number): void;
   include(a: number, b: number): void;
   /** Queries all pairs that may have changed. */
