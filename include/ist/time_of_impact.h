@@ -39,7 +39,7 @@ enum class ImpactKind : std::uint32_t {
   /// AssetView::mesh_error; without a mesh it is how far cover balls stick out, 1 to 10 % of
   /// the size.
   unresolved = 2,
-  /// They overlap at the start: surfaces cross, or one solid contains the other.
+  /// They touch or overlap at the start: surfaces meet, or one solid contains the other.
   overlapping = 3,
 };
 

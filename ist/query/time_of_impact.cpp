@@ -343,7 +343,7 @@ double tolerance_of(const ImpactSettings& settings, double smaller, double error
 }
 
 double bounding_radius(const PlacedAsset& placed) noexcept {
-  return placed.asset.header().inner_tree.root[3];
+  return root_ball(placed.asset.header()).r;
 }
 
 /// True if one solid contains a part of the other without an intersection of their surfaces.
@@ -357,7 +357,6 @@ bool one_contains_other(const ImpactSide& a, const ImpactSide& b,
 
 TimeOfImpact find_impact(const PlacedAsset& a, const PlacedAsset& b, const Motions& motions,
                          const ImpactSettings& settings, Workspace& workspace) noexcept {
-  if (lack_spheres(a, b)) return missing_data<TimeOfImpact>();
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
   if (!frame || workspace.impl() == nullptr) return invalid_input<TimeOfImpact>();
   const ImpactSide side_a(a.asset), side_b(b.asset);
@@ -372,7 +371,6 @@ TimeOfImpact find_impact(const PlacedAsset& a, const PlacedAsset& b, const Motio
 
 TimeOfImpact find_impact(const PlacedShape& a, const PlacedAsset& b, const Motions& motions,
                          const ImpactSettings& settings, Workspace& workspace) noexcept {
-  if (lack_spheres(a, b)) return missing_data<TimeOfImpact>();
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
   if (!frame || workspace.impl() == nullptr) return invalid_input<TimeOfImpact>();
   const ImpactSide side(b.asset);

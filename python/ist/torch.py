@@ -101,29 +101,55 @@ class _Answers(torch.autograd.Function):
         ctx.answer = kind(scene, placed, sizes, _ARRAY, settings, wants_pose=wants_pose,
                           wants_scale=wants_scale)
         ctx.pairs, ctx.length = scene.pairs, length
+        ctx.save_for_backward(poses, scales)
         ctx.like = [(x.shape, x.dtype) if x is not None else None for x in (poses, scales)]
         return torch.where(ctx.answer.valid, ctx.answer.value, torch.nan).to(poses.dtype)
 
     @staticmethod
-    @torch.autograd.function.once_differentiable
     def backward(ctx, slope):
-        answer = ctx.answer
-        slope = torch.where(answer.valid, slope.to(torch.float64), torch.nan)
-        by_pose = by_scale = None
-        if ctx.needs_input_grad[0]:
-            shape, dtype = ctx.like[0]
-            total = slope.new_zeros(shape)
-            for solid, gradient in zip(ctx.pairs, answer.pose_gradients()):
-                total.index_add_(-2, solid, slope[..., None] * gradient)
-            total[..., :4] /= ctx.length
-            by_pose = total.to(dtype)
-        if ctx.needs_input_grad[1]:
-            shape, dtype = ctx.like[1]
-            total = slope.new_zeros(shape)
-            for solid, gradient in zip(ctx.pairs, answer.scale_gradients()):
-                total.index_add_(-1, solid, slope * gradient)
-            by_scale = total.to(dtype)
-        return by_pose, by_scale, None, None, None
+        with torch.no_grad():
+            found = _gradients(ctx, slope.to(torch.float64))
+        if torch.is_grad_enabled():  # someone may differentiate them
+            found = [x if x is None else _Once.apply(x, slope, *ctx.saved_tensors) for x in found]
+        return *found, None, None, None
+
+
+def _gradients(ctx, slope):
+    """By poses and by scales, where they are wanted."""
+    answer = ctx.answer
+    slope = torch.where(answer.valid | (slope == 0), slope, torch.nan)
+    by_pose = by_scale = None
+    if ctx.needs_input_grad[0]:
+        shape, dtype = ctx.like[0]
+        total = slope.new_zeros(shape)
+        for solid, gradient in zip(ctx.pairs, answer.pose_gradients()):
+            total.index_add_(-2, solid, _times(slope[..., None], gradient))
+        total[..., :4] = _times(total[..., :4], 1 / ctx.length)
+        by_pose = total.to(dtype)
+    if ctx.needs_input_grad[1]:
+        shape, dtype = ctx.like[1]
+        total = slope.new_zeros(shape)
+        for solid, gradient in zip(ctx.pairs, answer.scale_gradients()):
+            total.index_add_(-1, solid, _times(slope, gradient))
+        by_scale = total.to(dtype)
+    return by_pose, by_scale
+
+
+def _times(slope, gradient):
+    return torch.where(slope == 0, 0.0, slope * gradient)  # NaN in an unused output does no harm
+
+
+class _Once(torch.autograd.Function):
+    """Gradients whose own gradient, by what they follow from, is an error instead of 0."""
+
+    @staticmethod
+    def forward(ctx, gradient, *of):
+        return gradient.clone()
+
+    @staticmethod
+    def backward(ctx, slope):
+        raise RuntimeError("ist.torch: answers are differentiable once; detach() their gradients to take "
+                           "them as constants")
 
 
 def _ask(query, names, a, b, poses, **arguments):

@@ -235,9 +235,11 @@ void refuse_unanswered(const Rows& rows, QueryStatus status, Measure asked) {
     const std::string name = side == &row.a ? "a" : "b";
     if (asked != Measure::exact) {
       if (tree != nullptr && tree->sphere_count() == 0)
-        throw Error(name +
-                    ": is a mesh alone, without spheres; use penetration() with "
-                    "measure='exact', or bake it with bake()");
+        throw Error(name + ": is a mesh alone, without spheres; " +
+                    (row.a.tree() != nullptr && row.b.tree() != nullptr
+                         ? "use penetration() with measure='exact', or "
+                         : "") +
+                    "bake it with bake()");
     } else if (tree == nullptr) {
       throw Error(name + ": a Shape has no mesh, which measure='exact' needs; pass an Asset");
     } else if (!tree->has_mesh()) {

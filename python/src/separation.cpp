@@ -114,15 +114,16 @@ std::unique_ptr<Outline> outline(const Rows& rows, std::size_t each,
 
 py::object overlaps(const Rows& rows, double margin, unsigned threads) {
   const Column<std::uint32_t> answers(rows.shape());
-  if (rows.shape().empty() && !fault_of(rows.at(0)).empty())
-    refuse_unanswered(rows, QueryStatus::invalid_input);
+  QueryStatus status = QueryStatus::ok;
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
     const YesNoAnswer found = margin > 0
                                   ? overlap(row.a.placed(), row.b.placed(), margin, workspace)
                                   : overlap(row.a.placed(), row.b.placed(), workspace);
     answers.write(i, found.answer);
+    if (rows.shape().empty()) status = found.status;
   });
+  refuse_unanswered(rows, status);
   return answers.handed_out();
 }
 

@@ -115,6 +115,8 @@ void add_solid_rows(py::module_& module) {
               const py::object all = py::module_::import_("numpy").attr("arange")(size);
               return SolidRows{self, all[is_empty ? py::object(py::slice(0)) : index]};
             }
+            if (py::isinstance<py::bool_>(index))
+              throw type_error("solids[" + text_of(index) + "]: wanted whole numbers");
             if (!py::isinstance<py::int_>(index)) return SolidRows{self, index};
             std::size_t number = 0;
             if (!py::try_cast(index, number) || number >= size)

@@ -55,13 +55,14 @@ void add_time_of_impact(py::module_& module) {
         const Rows to =
             Rows::of_pair(a, b, poses_to, scales, poses_a_to.is_none() ? poses_a : poses_a_to,
                           scales_a, "poses_to");
-        if (from.shape() != to.shape())
+        const Rows& rows = from.shape().empty() ? to : from;
+        if (!to.shape().empty() && to.shape() != rows.shape())
           throw value_error("poses_to: shape " + text_of(to.shape()) + " of rows; poses have " +
                             text_of(from.shape()));
         const Eigen::Vector3d centre = take_vector(about, "about"),
                               centre_a = take_vector(about_a, "about_a");
-        auto answers = std::make_unique<Impacts>(Impacts{from.shape()});
-        for_each_row(from, threads, [&](std::size_t i, Workspace& workspace) {
+        auto answers = std::make_unique<Impacts>(Impacts{rows.shape()});
+        for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
           const Row start = from.at(i), end = to.at(i);
           const Motions motions{
               motion_between(start.a.pose, end.a.pose, settings.duration, centre_a, start.a.scale),
@@ -70,7 +71,7 @@ void add_time_of_impact(py::module_& module) {
               *answers, i,
               time_of_impact(start.a.placed(), start.b.placed(), motions, settings, workspace));
         });
-        if (from.shape().empty()) {
+        if (rows.shape().empty()) {
           const auto status = QueryStatus{*answers->status.row(0)};
           if (status == QueryStatus::invalid_input && fault_of(from.at(0)).empty()) {
             const std::string fault = fault_of(to.at(0), "poses_to");

@@ -137,7 +137,12 @@ def test_a_surface_alone_answers_no_query_of_spheres(cube):
     found = ist.penetration(again, cube, [one])
     assert found.status[0] == ist.QueryStatus.missing_data and np.isnan(found.volume[0])
     assert np.isnan(ist.separation(cube, again, [one], inner_spheres=True).distance[0])
-    assert ist.separation(cube, again, [1, 0, 0, 0, 3, 0, 0]).distance > 0  # of the meshes
+    away = [1, 0, 0, 0, 3, 0, 0]
+    assert ist.separation(cube, again, away).distance > 0  # of the meshes
+    assert ist.time_of_impact(cube, again, away, one).kind is ist.ImpactKind.impact
+    with pytest.raises(ist.Error, match="b: is a mesh alone, without spheres; bake it"):
+        ist.overlap(ist.BallShape(1), again, away)
+    assert ist.overlap(ist.BallShape(1), again, [away]) == [ist.YesNo.unknown]
 
 
 @pytest.mark.parametrize("keep_mesh, state", [(True, "own"), (False, "none")])

@@ -293,6 +293,17 @@ def test_an_accepted_error_takes_the_meshes_where_these_are_cheap(cube):
     assert limited.status == ist.QueryStatus.error_exceeded
 
 
+def test_one_end_of_a_motion_applies_to_all_rows(cube):
+    many = [AWAY, np.multiply(AWAY, [1, 1, 1, 1, 2, 2, 2])]
+    found = ist.time_of_impact(cube, cube, many, IDENTITY)
+    back = ist.time_of_impact(cube, cube, IDENTITY, many)
+    for i, pose in enumerate(many):
+        assert found.time[i] == ist.time_of_impact(cube, cube, pose, IDENTITY).time
+        assert back.kind[i] == ist.ImpactKind.overlapping
+    with pytest.raises(ValueError, match=r"poses_to: shape \(3,\) of rows; poses have \(2,\)"):
+        ist.time_of_impact(cube, cube, many, [IDENTITY] * 3)
+
+
 def test_limits_that_are_none_are_refused(cube):
     for arguments, text in ((dict(relative_error=np.nan), "relative_error: nan; wanted a number ≥ 0"),
                             (dict(relative_error=-1.0), "relative_error: -1.0"),
@@ -600,8 +611,6 @@ def test_impacts_come_in_time(cube):
     assert found.time[0] == pytest.approx((10 * side + lower) / (10 * side), rel=1e-2)
     assert found.normal[0] == pytest.approx([1, 0, 0], abs=1e-6)
     assert ist.time_of_impact(wall, cube, start[0], end[0]).time < 1
-    with pytest.raises(ValueError, match="poses_to: shape"):
-        ist.time_of_impact(wall, cube, start, end[0])
 
 
 def test_limits_are_taken(gear, knot, random_poses):

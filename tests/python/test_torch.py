@@ -121,6 +121,24 @@ def test_an_invalid_pose_is_nan_where_it_is(gear, knot, cube, scenes):
     volumes.sum().backward()
     fine = [0, 2, 3, 5]
     assert torch.isfinite(spoiled.grad[fine]).all() and torch.isnan(spoiled.grad[1]).all()
+    # Answers that nobody differentiates leave the others alone.
+    for ask, among in ((overlap, scenes), (separation, apart(scenes)[0].detach())):
+        bad, good = among.detach().clone(), among.detach().clone()
+        bad[4, 0, :4] = 0
+        for poses in (bad.requires_grad_(), good.requires_grad_()):
+            torch.nansum(ask([gear, knot, cube], poses)[:, 2]).backward()
+        assert torch.equal(bad.grad, good.grad) and bad.grad[4, 0].eq(0).all()
+
+
+def test_gradients_of_gradients_are_refused(cube):
+    poses = torch.tensor([[1.0, 0, 0, 0, 0, 0, 0], [0.9, 0.1, 0.3, 0.2, 0.9, 0.3, 0.2]],
+                         dtype=torch.float64, requires_grad=True)
+    volume = overlap([cube, cube], poses).sum()
+    gradient, = torch.autograd.grad(volume, poses, create_graph=True)
+    with pytest.raises(RuntimeError, match="differentiable once"):
+        (volume + gradient.square().sum()).backward()
+    plain, = torch.autograd.grad(overlap([cube, cube], poses).sum(), poses)
+    assert not plain.requires_grad and torch.equal(plain, gradient)
 
 
 def test_wrong_tensors_are_named(gear, knot):

@@ -217,12 +217,6 @@ void expect_missing_data(const Separation& found) {
     EXPECT_TRUE(std::isnan(x));
 }
 
-void expect_missing_data(const TimeOfImpact& found) {
-  EXPECT_EQ(found.status, QueryStatus::missing_data);
-  for (const double x : {found.time, found.distance_min, found.distance_max, found.point_a[0]})
-    EXPECT_TRUE(std::isnan(x));
-}
-
 TEST_F(SurfaceAlone, AnswersNoQueryOfSpheres) {
   const PlacedAsset alone{alone_.view(), {}, 1}, whole{whole_.view(), {}, 1};
   for (const auto& [a, b] : {std::pair(alone, whole), {whole, alone}, {alone, alone}}) {
@@ -242,7 +236,6 @@ TEST_F(SurfaceAlone, AnswersNoQueryOfSpheres) {
     }
     expect_missing_data(separation(a, b, {.inner_spheres = true}, workspace_));
     EXPECT_EQ(separation(a, b, {}, workspace_).status, QueryStatus::ok);
-    expect_missing_data(time_of_impact(a, b, {}, {}, workspace_));
     EXPECT_EQ(overlap(a, b, workspace_), YesNo::yes);
     PlacedAsset away = b;
     away.pose.t[0] = 100;
@@ -257,13 +250,46 @@ TEST_F(SurfaceAlone, AnswersNoQueryOfSpheres) {
   }
 }
 
+/// The mesh answers them, with spheres and without.
+TEST_F(SurfaceAlone, HasTheTimesOfImpactOfTheWholeAsset) {
+  ImpactSettings settings;
+  settings.duration = 4;
+  settings.tolerance = 1e-3;
+  const Motion away{{-1, 0.1, 0.2}, {0.3, 0.8, -0.2}, Eigen::Vector3d::Zero()};
+  const PlacedShape ball{BallShape{0.5}, {}, 1};
+  int impacts = 0;
+  for (double y = -3; y <= 3; y += 0.25) {
+    const Pose start{{0.9, 0.1, 0.3, 0.2}, {3.5, y, 0.1}};
+    const PlacedAsset alone{alone_.view(), start, 1}, whole{whole_.view(), start, 1};
+    const TimeOfImpact pairs[][2] = {
+        {time_of_impact(PlacedAsset{alone_.view(), {}, 1.2}, alone, {{}, away}, settings,
+                        workspace_),
+         time_of_impact(PlacedAsset{whole_.view(), {}, 1.2}, whole, {{}, away}, settings,
+                        workspace_)},
+        {time_of_impact(ball, alone, {{}, away}, settings, workspace_),
+         time_of_impact(ball, whole, {{}, away}, settings, workspace_)}};
+    for (const auto& [own, expected] : pairs) {
+      EXPECT_EQ(own.status, QueryStatus::ok);
+      EXPECT_EQ(own.kind, expected.kind) << y;
+      EXPECT_NEAR(own.time, expected.time, 2e-3) << y;
+      impacts += own.kind == ImpactKind::impact;
+    }
+  }
+  EXPECT_GT(impacts, 10);
+  EXPECT_EQ(time_of_impact(PlacedAsset{alone_.view(), {}, 1}, {alone_.view(), {}, 0.1}, {}, {},
+                           workspace_)
+                .kind,
+            ImpactKind::no_impact);  // in the torus's hole
+}
+
 TEST_F(SurfaceAlone, MeetsNoField) {
   const PlacedAsset alone{alone_.view(), {}, 1};
   const PlacedShape ball{BallShape{1}, {}, 1};
   expect_missing_data(penetration(ball, alone, {}, workspace_));
   expect_missing_data(separation(ball, alone, {}, workspace_));
-  expect_missing_data(time_of_impact(ball, alone, {}, {}, workspace_));
-  EXPECT_EQ(overlap(ball, alone, workspace_), YesNo::unknown);
+  const YesNoAnswer unknown = overlap(ball, alone, workspace_);
+  EXPECT_EQ(unknown, YesNo::unknown);
+  EXPECT_EQ(unknown.status, QueryStatus::missing_data);
   std::vector<ContactPatch> patches(4);
   expect_missing_data(contact_patches(ball, alone, {}, workspace_, patches).penetration);
 }

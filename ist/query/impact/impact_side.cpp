@@ -29,8 +29,18 @@ bool contains_sphere(const MeshTree& a, const ImpactSide& b, const Similarity& a
 
 }  // namespace
 
+RootBall root_ball(const AssetHeader& asset) noexcept {
+  if (asset.sphere_count != 0)
+    return RootBall::of(asset.inner_tree.root, asset.inner_tree.root_cover);
+  RootBall ball{};
+  for (int k = 0; k < 3; ++k)
+    ball.centre[k] = std::ldexp(asset.ball_centre[k] - asset.centre[k], -asset.exponent);
+  ball.r = kMore * std::ldexp(asset.ball_radius, -asset.exponent);
+  return ball;
+}
+
 ImpactSide::ImpactSide(const AssetView& view) noexcept
-    : spheres_(sphere_tree(view, Measure::inner)) {
+    : spheres_(sphere_tree(view, Measure::inner)), root_(root_ball(view.header())) {
   if (!view.has_mesh()) return;
   const AssetHeader& asset = view.header();
   mesh_.emplace(asset, *at<MeshHeader>(asset, asset.mesh));
@@ -44,11 +54,8 @@ std::uint32_t ImpactSide::children(int level, std::uint32_t number) const noexce
 }
 
 NodeBall ImpactSide::ball(int level, std::uint32_t number) const noexcept {
-  if (level == top()) {
-    const TreeHeader& tree = *spheres_.header;
-    const double reach = std::max(tree.root[3], tree.root_cover);
-    return {{tree.root[0], tree.root[1], tree.root[2]}, reach + 2 * error_};
-  }
+  if (level == top())
+    return {{root_.centre[0], root_.centre[1], root_.centre[2]}, root_.reach() + 2 * error_};
   if (!mesh_) {
     NodeBall ball = spheres_.ball(level, number);
     ball.r = level == kSphereLevel ? static_cast<double>(spheres_.sphere_cover[number])

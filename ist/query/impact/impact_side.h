@@ -26,6 +26,9 @@ struct PointHull {
   std::uint32_t count = 0;
 };
 
+/// A ball around the solid, or around its spheres. Unit frame.
+RootBall root_ball(const AssetHeader& asset) noexcept;
+
 /// A moving solid as a tree of balls: the triangles of its mesh or, if its asset has none, the
 /// cover balls of its inner spheres. Unit frame. A level and a number identify a node, as in
 /// SphereTree: at kSphereLevel one triangle or sphere, at the top level the whole solid.
@@ -57,6 +60,7 @@ class ImpactSide {
 
  private:
   SphereTree spheres_;
+  RootBall root_;
   std::optional<MeshTree> mesh_;
   double error_ = 0;  ///< of the mesh
 };

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include <ist/asset_layout.h>
+#include "query/impact/impact_side.h"
 
 namespace ist {
 namespace {
@@ -38,15 +39,13 @@ MovingBody body(const Pose& pose, double scale, const Motion& motion, const Asse
   body.unit = std::ldexp(scale, asset->exponent) / unit;
   for (int k = 0; k < 3; ++k)
     body.centre[k] = std::ldexp(motion.about[k] - asset->centre[k], -asset->exponent);
-  const TreeHeader& tree = asset->inner_tree;
-  const Vector3d middle(tree.root);
+  const RootBall root = root_ball(*asset);
   double error = 0;
   if (asset->mesh != 0) {
     const MeshHeader& mesh = *at<MeshHeader>(*asset, asset->mesh);
     error = mesh.error + mesh.rounding;
   }
-  body.reach =
-      body.unit * ((middle - body.centre).norm() + std::max(tree.root[3], tree.root_cover) + error);
+  body.reach = body.unit * ((Vector3d(root.centre) - body.centre).norm() + root.reach() + error);
   return body;
 }
 
