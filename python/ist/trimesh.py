@@ -335,28 +335,19 @@ class _Pairs:
         return len(self.first)
 
     def ask(self, query, chosen=slice(None), aside=0, **settings):
-        """The query of some of them, in one call. aside: of B, in sizes of A; an array, one for each chosen."""
+        """The query of some of them, in one call. aside: of B, in sizes of A."""
         first = self.first[chosen]
         poses = self.poses_b[chosen]
-        if np.any(aside):
+        if aside:
             poses = poses.copy()
             poses[:, 4:] += (aside * np.array([self.of_a.objects[row].size for row in first]))[:, None] * _WAY
         return query(self.of_a.solids(first), self.of_b.solids(self.second[chosen]), poses,
                      poses_a=self.poses_a[chosen], **settings)
 
-    def penetration(self, chosen, aside=0):
-        answers = self.ask(ist.penetration, chosen, aside, measure="exact")
+    def penetration(self, chosen):
+        answers = self.ask(ist.penetration, chosen, measure="exact")
         _refuse_unanswered(self, chosen, answers.status)
         return answers
-
-    def overlaps(self, chosen):
-        """Volumes, forces on B and centroids.
-
-        Where faces are flush beside an overlap its slope jumps, and the mean of both sides is that of
-        neither face.
-        """
-        both = self.penetration(np.tile(chosen, 2), np.repeat([-_ASIDE, _ASIDE], len(chosen)))
-        return (np.mean(np.split(getattr(both, what), 2), axis=0) for what in ("volume", "force", "centroid"))
 
     def touched(self, chosen, answers, rows):
         """(k, 3): the middle of the faces that lie on each other, or else where solids touch."""
@@ -423,8 +414,8 @@ def _parts(pairs, i):
     orders = [np.argsort(-side[2][:count]) for side in sides]
     force, volume, point = (sum(side[k][order] for side, order in zip(sides, orders)) / len(sides)
                             for k in (1, 2, 3))
-    normal, depth = _directions(force, volume), _depths(volume, np.linalg.norm(force, axis=1))
-    return [(i, ContactData(pairs, i, normal[k], point[k], float(depth[k]), float(volume[k])))
+    normal, area = _directions(force, volume), np.linalg.norm(force, axis=1)
+    return [(i, ContactData(pairs, i, normal[k], point[k], ist._core._depth(volume[k], area[k]), float(volume[k])))
             for k in range(count)]
 
 
@@ -432,11 +423,6 @@ def _directions(force, volume):
     """Unit; zero where forces cancel but for rounding, as of a bar through a plate."""
     area = np.linalg.norm(force, axis=1)[:, None]
     return np.where(area > 1e-9 * np.cbrt(volume**2)[:, None], force / np.maximum(area, 1e-300), 0)
-
-
-def _depths(volume, area):
-    """Where forces cancel, as of a solid inside another: the size of the overlap."""
-    return np.minimum(volume / np.maximum(area, 1e-300), np.cbrt(volume))
 
 
 def _nearest(near_by, count, margin, with_data):
@@ -465,32 +451,16 @@ def _nearest(near_by, count, margin, with_data):
 def _deepest(pairs):
     """(minus the depth of the deepest overlap, (pairs, its number, points on both)); 0 where solids
     only touch, inf where they do not."""
-    best, nearest = np.inf, None
-    bound = pairs.ask(ist._core._nearness)
-    order, begin, size = np.argsort(bound, kind="stable"), 0, _FIRST
-    while begin < len(order) and bound[order[begin]] <= 0 and bound[order[begin]] < best:
-        chosen = order[begin:begin + size]
-        chosen = chosen[(bound[chosen] <= 0) & (bound[chosen] < best)]
-        answers = pairs.penetration(chosen)
-        touch = np.flatnonzero(answers.touching)[:1]
-        if best > 0 and len(touch) > 0:
-            point, = pairs.touched(chosen, answers, touch)
-            best, nearest = 0.0, (pairs, int(chosen[touch[0]]), (point, point))
-        # The probably deepest first. None is deeper than the cube root of its volume.
-        likely = np.argsort(-_depths(answers.volume, np.linalg.norm(answers.force, axis=1)), kind="stable")
-        most = -np.cbrt(answers.volume[likely])
-        for asked in slice(1), slice(1, None):
-            of = chosen[likely[asked]][most[asked] < min(best, 0)]
-            if len(of) == 0:
-                break
-            volume, force, point = pairs.overlaps(of)
-            depth = _depths(volume, np.linalg.norm(force, axis=1))
-            k = int(depth.argmax())
-            if -depth[k] < best:
-                half = 0.5 * depth[k] * _directions(force, volume)[k]
-                best, nearest = -depth[k], (pairs, int(of[k]), (point[k] + half, point[k] - half))
-        begin, size = begin + size, 4 * size
-    return best, nearest
+    distance, i, volume, (force, point), status = pairs.ask(ist._core._deepest, way=_ASIDE * _WAY)
+    if i < 0:
+        return distance, None
+    _refuse_unanswered(pairs, [i], np.array([status]))
+    if distance == 0:
+        one = np.array([i])
+        point, = pairs.touched(one, pairs.penetration(one), one * 0)
+        return 0.0, (pairs, i, (point, point))
+    half = -0.5 * distance * _directions(force[None], np.array([volume]))[0]
+    return distance, (pairs, i, (point + half, point - half))
 
 
 def _least(pairs, best, nearest):
