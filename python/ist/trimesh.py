@@ -212,8 +212,8 @@ class CollisionManager:
             distance, names, data = _nearest(self._within, count * (count - 1) // 2, self._size(), return_data)
         else:
             row = self._row(name)
-            distance, names, data = _nearest(lambda margin: self._near(self._bodies, [row], margin), count - 1,
-                                             self._bodies.objects[row].size, return_data)
+            distance, names, data = _nearest(lambda margin: self._near(self._bodies, [row], margin, itself=False),
+                                             count - 1, self._bodies.objects[row].size, return_data)
         return _told(distance, names and tuple(sorted(names)), data, return_names, return_data)
 
     def min_distance_other(self, other_manager, return_names=False, return_data=False):
@@ -266,15 +266,15 @@ class CollisionManager:
             self._margin = margin
         return self._scene
 
-    def _near(self, others, rows, margin=0):
-        """As _within(), of objects of this manager and of others in these rows."""
+    def _near(self, others, rows, margin=0, itself=True):
+        """As _within(), of objects of this manager and of others in these rows, be it one `itself`."""
         if self._moved:
             self._within()
         scene = self._placed(0)
         near = [scene._near(others.objects[row].asset, others.poses[row], margin).astype(int) for row in rows]
         first = near[0] if len(near) == 1 else np.concatenate([np.zeros(0, int), *near])
-        second = np.repeat(rows, [len(found) for found in near])
-        if others is self._bodies:
+        second = np.repeat(np.array(rows, int), [len(found) for found in near])
+        if not itself:
             first, second = first[first != second], second[first != second]
         return _Pairs(self._bodies, others, first, second)
 
