@@ -18,6 +18,7 @@ __all__ = ["CollisionManager", "ContactData", "DistanceData", "scene_to_collisio
 
 _ASIDE, _WAY = 1e-9, np.array([0.36, 0.48, 0.8])  # of an object's size, and where to
 _FIRST = 16  # distances that are queried first: the best of them bounds the others
+_SOME = 64  # objects that are asked first: one of them may collide already
 
 
 class _Data:
@@ -194,8 +195,11 @@ class CollisionManager:
 
     def in_collision_other(self, other_manager, return_names=False, return_data=False):
         """Whether an object collides with one of another manager; names are (own, other's)."""
-        pairs = self._near(other_manager._bodies, list(other_manager._objs.values()))
-        found, names, data = _collide(pairs, return_names, return_data)
+        others, rows = other_manager._bodies, list(other_manager._objs.values())
+        if not (return_names or return_data):
+            ends = [0, *range(_SOME, len(rows), 8 * _SOME), len(rows)]
+            return any(len(_hits(self._near(others, rows[i:j]), True)[0]) > 0 for i, j in zip(ends, ends[1:]))
+        found, names, data = _collide(self._near(others, rows), return_names, return_data)
         return _told(found, set(names), data, return_names, return_data)
 
     def min_distance_single(self, mesh, transform=None, return_name=False, return_data=False):
@@ -270,10 +274,8 @@ class CollisionManager:
         """As _within(), of objects of this manager and of others in these rows, be it one `itself`."""
         if self._moved:
             self._within()
-        scene = self._placed(0)
-        near = [scene._near(others.objects[row].asset, others.poses[row], margin).astype(int) for row in rows]
-        first = near[0] if len(near) == 1 else np.concatenate([np.zeros(0, int), *near])
-        second = np.repeat(np.array(rows, int), [len(found) for found in near])
+        rows = np.array(rows, int)
+        first, second = self._placed(0)._near(others.solids(rows), others.poses[rows], margin)
         if not itself:
             first, second = first[first != second], second[first != second]
         return _Pairs(self._bodies, others, first, second)

@@ -199,7 +199,8 @@ def test_the_deepest_of_what_is_flush():
                 told[i, j] = np.linalg.norm(np.maximum(np.abs(spots[i] - spots[j]) - halves[i] - halves[j], 0))
         least = min(told.values())
         far, names, data = m.min_distance_internal(return_names=True, return_data=True)
-        assert far == data.distance == pytest.approx(least, rel=1e-12) and told[names] == pytest.approx(least, rel=1e-12)
+        assert far == data.distance == pytest.approx(least, rel=1e-12)
+        assert told[names] == pytest.approx(least, rel=1e-12)
         found["deep" if least < 0 else "touching" if least == 0 else "apart"] += 1
     assert min(found.values()) > 0
 
@@ -222,6 +223,21 @@ def test_few_of_many_are_looked_at(monkeypatch):
     n = CollisionManager()
     n.add_object("far", Box(), at(0, 0, -1e6 - 3))
     assert m.min_distance_other(n, return_names=True) == (2, (500, "far"))
+
+
+def test_the_one_of_many_that_another_manager_meets():
+    m, n = CollisionManager(), CollisionManager()
+    m.add_object("a", Box())
+    for i in range(600):
+        n.add_object(i, Box(), at(3 * i + 3))
+    assert m.in_collision_other(n) is n.in_collision_other(m) is False
+    for i in (0, 63, 64, 575, 576, 599):
+        n.set_transform(i, at(0.5))
+        assert m.in_collision_other(n) is n.in_collision_other(m) is True
+        assert m.in_collision_other(n, return_names=True) == (True, {("a", i)})
+        n.set_transform(i, at(0, 3))
+        assert m.in_collision_other(n) is False and m.min_distance_other(n, return_names=True) == (2, ("a", i))
+        n.remove_object(i)
 
 
 def test_what_a_scene_refuses_is_raised(monkeypatch):
