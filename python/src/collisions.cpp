@@ -144,7 +144,8 @@ struct Deepest {
   }
 };
 
-/// The deepest overlap of the rows: those that may be deepest are asked first.
+/// The deepest overlap of the rows. Those that may be deepest are asked first, one, four, 16 … at a
+/// time: the best of them bounds the others.
 Deepest deepest(const GivenPair& pair, const Eigen::Vector3d& way) {
   const Rows rows = pair.rows();
   std::vector<std::pair<double, std::int64_t>> bounded;  // that may overlap or touch
@@ -152,15 +153,21 @@ Deepest deepest(const GivenPair& pair, const Eigen::Vector3d& way) {
     if (const double bound = nearness(rows.at(i)); bound <= 0)
       bounded.emplace_back(bound, static_cast<std::int64_t>(i));
   std::sort(bounded.begin(), bounded.end());
-  Deepest found;
-  auto next = bounded.begin();
-  for_each_row(rows, 1, [&](std::size_t, Workspace& workspace) {  // one row each time, in our order
-    if (next == bounded.end() || next->first >= found.distance || found.status != QueryStatus::ok)
-      return;
-    const auto row = next++->second;
-    found.ask(rows.at(static_cast<std::size_t>(row)), row, way, workspace);
-  });
-  return found;
+  Deepest best;
+  for (std::size_t begin = 0, size = 1;
+       begin < bounded.size() && bounded[begin].first < best.distance; begin += size, size *= 4) {
+    std::vector<Deepest> some(std::min(size, bounded.size() - begin), best);
+    for_each_of(some.size(), 0, [&](std::size_t i, Workspace& workspace) {
+      const auto& [bound, row] = bounded[begin + i];
+      if (bound < best.distance)
+        some[i].ask(rows.at(static_cast<std::size_t>(row)), row, way, workspace);
+    });
+    for (const Deepest& one : some) {
+      if (one.status != QueryStatus::ok) return one;
+      if (one.distance < best.distance) best = one;
+    }
+  }
+  return best;
 }
 
 }  // namespace
