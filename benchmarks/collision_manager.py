@@ -37,7 +37,16 @@ def transforms(count, spacing, turned, seed):
     return made
 
 
-def calls(spacing, first, moved):
+def filled(placed, meshes):
+    """Ours and trimesh's."""
+    managers = ist.trimesh.CollisionManager(), trimesh.collision.CollisionManager()
+    for manager in managers:
+        for i, transform in enumerate(placed):
+            manager.add_object(str(i), meshes[i % len(meshes)], transform)
+    return managers
+
+
+def calls(spacing, first, moved, others):
     middle = np.eye(4)
     middle[:3, 3] = spacing / 2
 
@@ -56,6 +65,8 @@ def calls(spacing, first, moved):
         "min_distance_single": lambda m: m.min_distance_single(SMALL, middle),
         "one moves, in_collision_internal": lambda m: move(m, 1),
         "all move, in_collision_internal": lambda m: move(m, len(first)),
+        "in_collision_other": lambda m: m.in_collision_other(others[type(m)]),
+        "in_collision_other names": lambda m: len(m.in_collision_other(others[type(m)], return_names=True)[1]),
     }
 
 
@@ -73,11 +84,11 @@ def timed(call, manager):
 
 def rows(count, spacing, meshes):
     first, moved = (transforms(count, spacing, meshes is MESHES, seed) for seed in (5, 8))
-    managers = ist.trimesh.CollisionManager(), trimesh.collision.CollisionManager()
-    for manager in managers:
-        for i, transform in enumerate(first):
-            manager.add_object(str(i), meshes[i % len(meshes)], transform)
-    for name, call in calls(spacing, first, moved).items():
+    managers = filled(first, meshes)
+    aside = np.eye(4)
+    aside[:3, 3] = spacing * np.array([np.ceil(count ** (1 / 3)) - 1, 0.5, 0.5])  # where ours end
+    others = {type(manager): manager for manager in filled([aside @ transform for transform in moved], meshes)}
+    for name, call in calls(spacing, first, moved, others).items():
         (own, answer), (other, others) = (timed(call, manager) for manager in managers)
         yield {"call": name, "ist ms": own, "FCL ms": other, "FCL/ist": other / own, "ist": answer, "FCL": others,
                "same": "yes" if answer == others or abs(answer - others) <= 1e-6 * abs(answer) else "no"}
@@ -97,6 +108,7 @@ def main():
         "tells that of the first pair that it finds, here it is the deepest of all, 0 too. "
         "Contacts have volumes here, one for each connected part of an overlap; FCL's are of triangles.",
         "Alone, `in_collision_internal` asks two objects first that collided before.",
+        "In `in_collision_other` the other manager's objects begin among the last of these.",
         "Of flush boxes FCL finds no collision at all where faces match (findings/fcl_flush_boxes.sh)."]
     out.write_text(json.dumps({
         "benchmark": "collision_manager", "page": "trimesh's CollisionManager",

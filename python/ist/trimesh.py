@@ -18,6 +18,7 @@ __all__ = ["CollisionManager", "ContactData", "DistanceData", "scene_to_collisio
 
 _ASIDE, _WAY = 1e-9, np.array([0.36, 0.48, 0.8])  # of an object's size, and where to
 _FIRST = 16  # distances that are queried first: the best of them bounds the others
+_SOME = 64  # objects that are asked first: one of them may collide already
 
 
 class _Data:
@@ -194,8 +195,11 @@ class CollisionManager:
 
     def in_collision_other(self, other_manager, return_names=False, return_data=False):
         """Whether an object collides with one of another manager; names are (own, other's)."""
-        pairs = self._near(other_manager._bodies, list(other_manager._objs.values()))
-        found, names, data = _collide(pairs, return_names, return_data)
+        others, rows = other_manager._bodies, list(other_manager._objs.values())
+        if not (return_names or return_data):
+            ends = [0, *range(_SOME, len(rows), 8 * _SOME), len(rows)]
+            return any(len(_hits(self._near(others, rows[i:j]), True)[0]) > 0 for i, j in zip(ends, ends[1:]))
+        found, names, data = _collide(self._near(others, rows), return_names, return_data)
         return _told(found, set(names), data, return_names, return_data)
 
     def min_distance_single(self, mesh, transform=None, return_name=False, return_data=False):
@@ -212,8 +216,8 @@ class CollisionManager:
             distance, names, data = _nearest(self._within, count * (count - 1) // 2, self._size(), return_data)
         else:
             row = self._row(name)
-            distance, names, data = _nearest(lambda margin: self._near(self._bodies, [row], margin), count - 1,
-                                             self._bodies.objects[row].size, return_data)
+            distance, names, data = _nearest(lambda margin: self._near(self._bodies, [row], margin, itself=False),
+                                             count - 1, self._bodies.objects[row].size, return_data)
         return _told(distance, names and tuple(sorted(names)), data, return_names, return_data)
 
     def min_distance_other(self, other_manager, return_names=False, return_data=False):
@@ -266,15 +270,13 @@ class CollisionManager:
             self._margin = margin
         return self._scene
 
-    def _near(self, others, rows, margin=0):
-        """As _within(), of objects of this manager and of others in these rows."""
+    def _near(self, others, rows, margin=0, itself=True):
+        """As _within(), of objects of this manager and of others in these rows, be it one `itself`."""
         if self._moved:
             self._within()
-        scene = self._placed(0)
-        near = [scene._near(others.objects[row].asset, others.poses[row], margin).astype(int) for row in rows]
-        first = near[0] if len(near) == 1 else np.concatenate([np.zeros(0, int), *near])
-        second = np.repeat(rows, [len(found) for found in near])
-        if others is self._bodies:
+        rows = np.array(rows, int)
+        first, second = self._placed(0)._near(others.solids(rows), others.poses[rows], margin)
+        if not itself:
             first, second = first[first != second], second[first != second]
         return _Pairs(self._bodies, others, first, second)
 
@@ -335,28 +337,19 @@ class _Pairs:
         return len(self.first)
 
     def ask(self, query, chosen=slice(None), aside=0, **settings):
-        """The query of some of them, in one call. aside: of B, in sizes of A; an array, one for each chosen."""
+        """The query of some of them, in one call. aside: of B, in sizes of A."""
         first = self.first[chosen]
         poses = self.poses_b[chosen]
-        if np.any(aside):
+        if aside:
             poses = poses.copy()
             poses[:, 4:] += (aside * np.array([self.of_a.objects[row].size for row in first]))[:, None] * _WAY
         return query(self.of_a.solids(first), self.of_b.solids(self.second[chosen]), poses,
                      poses_a=self.poses_a[chosen], **settings)
 
-    def penetration(self, chosen, aside=0):
-        answers = self.ask(ist.penetration, chosen, aside, measure="exact")
+    def penetration(self, chosen):
+        answers = self.ask(ist.penetration, chosen, measure="exact")
         _refuse_unanswered(self, chosen, answers.status)
         return answers
-
-    def overlaps(self, chosen):
-        """Volumes, forces on B and centroids.
-
-        Where faces are flush beside an overlap its slope jumps, and the mean of both sides is that of
-        neither face.
-        """
-        both = self.penetration(np.tile(chosen, 2), np.repeat([-_ASIDE, _ASIDE], len(chosen)))
-        return (np.mean(np.split(getattr(both, what), 2), axis=0) for what in ("volume", "force", "centroid"))
 
     def touched(self, chosen, answers, rows):
         """(k, 3): the middle of the faces that lie on each other, or else where solids touch."""
@@ -423,8 +416,8 @@ def _parts(pairs, i):
     orders = [np.argsort(-side[2][:count]) for side in sides]
     force, volume, point = (sum(side[k][order] for side, order in zip(sides, orders)) / len(sides)
                             for k in (1, 2, 3))
-    normal, depth = _directions(force, volume), _depths(volume, np.linalg.norm(force, axis=1))
-    return [(i, ContactData(pairs, i, normal[k], point[k], float(depth[k]), float(volume[k])))
+    normal, area = _directions(force, volume), np.linalg.norm(force, axis=1)
+    return [(i, ContactData(pairs, i, normal[k], point[k], ist._core._depth(volume[k], area[k]), float(volume[k])))
             for k in range(count)]
 
 
@@ -432,11 +425,6 @@ def _directions(force, volume):
     """Unit; zero where forces cancel but for rounding, as of a bar through a plate."""
     area = np.linalg.norm(force, axis=1)[:, None]
     return np.where(area > 1e-9 * np.cbrt(volume**2)[:, None], force / np.maximum(area, 1e-300), 0)
-
-
-def _depths(volume, area):
-    """Where forces cancel, as of a solid inside another: the size of the overlap."""
-    return np.minimum(volume / np.maximum(area, 1e-300), np.cbrt(volume))
 
 
 def _nearest(near_by, count, margin, with_data):
@@ -465,32 +453,16 @@ def _nearest(near_by, count, margin, with_data):
 def _deepest(pairs):
     """(minus the depth of the deepest overlap, (pairs, its number, points on both)); 0 where solids
     only touch, inf where they do not."""
-    best, nearest = np.inf, None
-    bound = pairs.ask(ist._core._nearness)
-    order, begin, size = np.argsort(bound, kind="stable"), 0, _FIRST
-    while begin < len(order) and bound[order[begin]] <= 0 and bound[order[begin]] < best:
-        chosen = order[begin:begin + size]
-        chosen = chosen[(bound[chosen] <= 0) & (bound[chosen] < best)]
-        answers = pairs.penetration(chosen)
-        touch = np.flatnonzero(answers.touching)[:1]
-        if best > 0 and len(touch) > 0:
-            point, = pairs.touched(chosen, answers, touch)
-            best, nearest = 0.0, (pairs, int(chosen[touch[0]]), (point, point))
-        # The probably deepest first. None is deeper than the cube root of its volume.
-        likely = np.argsort(-_depths(answers.volume, np.linalg.norm(answers.force, axis=1)), kind="stable")
-        most = -np.cbrt(answers.volume[likely])
-        for asked in slice(1), slice(1, None):
-            of = chosen[likely[asked]][most[asked] < min(best, 0)]
-            if len(of) == 0:
-                break
-            volume, force, point = pairs.overlaps(of)
-            depth = _depths(volume, np.linalg.norm(force, axis=1))
-            k = int(depth.argmax())
-            if -depth[k] < best:
-                half = 0.5 * depth[k] * _directions(force, volume)[k]
-                best, nearest = -depth[k], (pairs, int(of[k]), (point[k] + half, point[k] - half))
-        begin, size = begin + size, 4 * size
-    return best, nearest
+    distance, i, volume, (force, point), status = pairs.ask(ist._core._deepest, way=_ASIDE * _WAY)
+    if i < 0:
+        return distance, None
+    _refuse_unanswered(pairs, [i], np.array([status]))
+    if distance == 0:
+        one = np.array([i])
+        point, = pairs.touched(one, pairs.penetration(one), one * 0)
+        return 0.0, (pairs, i, (point, point))
+    half = -0.5 * distance * _directions(force[None], np.array([volume]))[0]
+    return distance, (pairs, i, (point + half, point - half))
 
 
 def _least(pairs, best, nearest):

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include <nanobind/stl/tuple.h>
@@ -80,6 +82,94 @@ Collisions collisions(const GivenPair& pair, bool only_first, bool tells_touchin
           static_cast<std::uint32_t>(answered ? QueryStatus::ok : *stop)};
 }
 
+/// How far apart an overlap pushes its solids [u]. Where forces cancel, as of a solid inside
+/// another: the size of the overlap.
+double depth_of(double volume, double area) {
+  return std::min(volume / std::max(area, 1e-300), std::cbrt(volume));
+}
+
+struct Deepest {
+  double distance = std::numeric_limits<double>::infinity();  ///< minus the depth; 0: touching
+  std::int64_t row = -1;                                      ///< −1: none
+  double volume = 0;
+  Eigen::Vector3d force{0, 0, 0}, centroid{0, 0, 0};  ///< on B
+  QueryStatus status = QueryStatus::ok;               ///< else of `row`, which stopped it
+
+  /// Asks one more row, of bound nearness(). Where faces are flush beside an overlap its slope
+  /// jumps, and the mean of both sides is that of neither face: it is asked with B aside by `way`,
+  /// in sizes of A, and by −way.
+  void ask(const Row& given, std::int64_t number, const Eigen::Vector3d& way,
+           Workspace& workspace) {
+    const Bounds own = bounds(*given.a.tree());
+    const Eigen::Vector3d step = (own.upper - own.lower).maxCoeff() * way;
+    PenetrationSettings settings;
+    settings.measure = Measure::exact;
+    const auto beside = [&](double steps) {
+      Row at = given;
+      for (int k = 0; k < 3; ++k) at.b.pose.t[k] += steps * step[k];
+      const Penetration answer = penetration(at.a.placed(), at.b.placed(), settings, workspace);
+      if (answer.status != QueryStatus::ok) {
+        status = answer.status;
+        row = number;
+      }
+      return answer;
+    };
+    const bool first = distance >= 0;
+    if (first) {
+      const Penetration answer = beside(0);
+      if (answer.touching && distance > 0) {
+        distance = 0;
+        row = number;
+      }
+      if (!(answer.volume > 0)) return;
+    }
+    const Penetration under = beside(-1);
+    // Half of what the volume gains by both steps adds at most one of them to the depth.
+    if (status != QueryStatus::ok || -std::cbrt(under.volume) - step.norm() >= distance) return;
+    const Penetration over = beside(1);
+    if (status != QueryStatus::ok) return;
+    const double of_both = (under.volume + over.volume) / 2;
+    const Eigen::Vector3d push = (under.force + over.force) / 2;
+    const double depth = depth_of(of_both, push.norm());
+    if (-depth >= distance) return;
+    // Between them solids may only touch.
+    const bool sure =
+        first || (depth > 1e5 * step.norm() && under.volume_min > 0 && over.volume_min > 0);
+    if (!sure && !(beside(0).volume > 0)) return;
+    distance = -depth;
+    row = number;
+    volume = of_both;
+    force = push;
+    centroid = (under.centroid + over.centroid) / 2;
+  }
+};
+
+/// The deepest overlap of the rows. Those that may be deepest are asked first, one, four, 16 … at a
+/// time: the best of them bounds the others.
+Deepest deepest(const GivenPair& pair, const Eigen::Vector3d& way) {
+  const Rows rows = pair.rows();
+  std::vector<std::pair<double, std::int64_t>> bounded;  // that may overlap or touch
+  for (std::size_t i = 0; i < rows.count(); ++i)
+    if (const double bound = nearness(rows.at(i)); bound <= 0)
+      bounded.emplace_back(bound, static_cast<std::int64_t>(i));
+  std::sort(bounded.begin(), bounded.end());
+  Deepest best;
+  for (std::size_t begin = 0, size = 1;
+       begin < bounded.size() && bounded[begin].first < best.distance; begin += size, size *= 4) {
+    std::vector<Deepest> some(std::min(size, bounded.size() - begin), best);
+    for_each_of(some.size(), 0, [&](std::size_t i, Workspace& workspace) {
+      const auto& [bound, row] = bounded[begin + i];
+      if (bound < best.distance)
+        some[i].ask(rows.at(static_cast<std::size_t>(row)), row, way, workspace);
+    });
+    for (const Deepest& one : some) {
+      if (one.status != QueryStatus::ok) return one;
+      if (one.distance < best.distance) best = one;
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 void add_collisions(py::module_& module) {
@@ -96,6 +186,18 @@ void add_collisions(py::module_& module) {
         for (std::size_t i = 0; i < rows.count(); ++i) out.write(i, nearness(rows.at(i)));
         return out.handed_out();
       });
+  add_pair_query(
+      module, "_deepest",
+      +[](const GivenPair& pair, const py::object& way) {
+        const Deepest found = deepest(pair, take_vector(way, "way"));
+        const Column<double, 3> vectors({2});
+        vectors.write(0, found.force);
+        vectors.write(1, found.centroid);
+        return std::tuple(found.distance, found.row, found.volume, vectors.handed_out(),
+                          static_cast<std::uint32_t>(found.status));
+      },
+      py::arg("way"));
+  module.def("_depth", depth_of, py::arg("volume"), py::arg("area"));
   module.def(
       "_poses",
       [](const py::object& matrices, const std::string& name) {

@@ -317,9 +317,12 @@ Pose take_pose(const py::object& pose, double scale, const std::string& name) {
   return taken;
 }
 
-void for_each_row(const Rows& rows, unsigned threads,
-                  const std::function<void(std::size_t, Workspace&)>& answer) {
-  const std::size_t count = rows.count();
+void for_each_row(const Rows& rows, unsigned threads, const AnswerRow& answer) {
+  for_each_of(rows.count(), threads,
+              [&](std::size_t i, Workspace& workspace) { answer(rows.asked(i), workspace); });
+}
+
+void for_each_of(std::size_t count, unsigned threads, const AnswerRow& answer) {
   take_threads(threads);
   if (count == 0) return;
   Interrupt interrupt;
@@ -329,7 +332,7 @@ void for_each_row(const Rows& rows, unsigned threads,
     constexpr std::size_t kFew = 8;  // fewer rows are not worth a second thread
     const auto ask = [&](std::vector<Workspace>& scratch, const ParallelFor& parallel) {
       answer_all(count, scratch.size(), parallel, [&](std::size_t i, std::size_t worker) {
-        if (!interrupt.seen()) answer(rows.asked(i), scratch[worker]);
+        if (!interrupt.seen()) answer(i, scratch[worker]);
       });
     };
     std::vector<Workspace> scratch;

@@ -7,6 +7,8 @@
 #include <map>
 #include <memory>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/unique_ptr.h>
@@ -147,6 +149,37 @@ Column<std::uint32_t> in_box(const PyScene& self, const Eigen::Vector3d& lower,
   Column<std::uint32_t> out({numbers.size()});
   for (std::size_t i = 0; i < numbers.size(); ++i) out.write(i, numbers[i]);
   return out;
+}
+
+/// For ist.trimesh: (2, n), bodies whose boxes are within `margin` of those of placed solids, and
+/// the indices of these.
+py::object near(const PyScene& self, const SolidRows& solids, const py::object& poses,
+                double margin) {
+  const Integers rows = take_integers(solids.index, "solids", "(n,) indices");
+  const Doubles at = take_doubles(poses, "poses", "(n, 7)");
+  if (at.size() != 7 * rows.size()) refuse_shape(at, "poses", "(n, 7)");
+  std::vector<std::uint32_t> numbers(self.scene.size());
+  std::vector<std::pair<std::uint32_t, std::int64_t>> found;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const std::int64_t row = rows.data()[i];
+    const SolidBox own =
+        solid_box(std::get<AssetView>(solids.among().views.at(static_cast<std::size_t>(row))));
+    Pose pose;
+    std::copy_n(at.data() + 7 * i, 4, pose.q);
+    std::copy_n(at.data() + 7 * i + 4, 3, pose.t);
+    const Rotation turn = Rotation::of(pose.q);
+    if (!own.placed(turn, pose.t, 0).fits()) throw value_error("an object reaches beyond 1e37 u");
+    const WorldBox box = own.placed(turn, pose.t, margin);
+    const std::size_t count = self.scene.in_box(vector(box.low), vector(box.high), numbers);
+    std::sort(numbers.data(), numbers.data() + count);
+    for (std::size_t k = 0; k < count; ++k) found.emplace_back(numbers[k], row);
+  }
+  const Column<std::int64_t> out({2, found.size()});
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    out.write(i, found[i].first);
+    out.write(found.size() + i, found[i].second);
+  }
+  return out.handed_out();
 }
 
 SceneStep ask_step(PyScene& self, const py::object& poses, const py::object& numbers) {
@@ -382,17 +415,7 @@ void add_scenes(py::module_& module) {
             return out.handed_out();
           },
           py::arg("poses"), py::arg("numbers"))
-      .def(
-          "_near",  // for ist.trimesh: bodies whose boxes are within `margin` of the solid's
-          [](const PyScene& self, const py::object& solid, const py::object& pose, double margin) {
-            const Pose at = take_pose(pose, 1);
-            const SolidBox own = solid_box(tree_of(solid, "solid"));
-            if (!own.placed(Rotation::of(at.q), at.t, 0).fits())
-              throw value_error("an object reaches beyond 1e37 u");
-            const WorldBox box = own.placed(Rotation::of(at.q), at.t, margin);
-            return in_box(self, vector(box.low), vector(box.high)).handed_out();
-          },
-          py::arg("solid"), py::arg("pose"), py::arg("margin"))
+      .def("_near", near, py::arg("solids"), py::arg("poses"), py::arg("margin"))
       .def(
           "exclude",
           [](PyScene& self, std::uint32_t a, std::uint32_t b) { self.scene.exclude(a, b); },

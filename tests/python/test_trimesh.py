@@ -52,6 +52,23 @@ def test_what_collides():
     assert m.in_collision_other(n, return_names=True) == (True, {("b", "d")})
 
 
+def test_a_manager_beside_an_empty_one_and_itself():
+    m, empty = CollisionManager(), CollisionManager()
+    for name, x in (("a", 0), ("b", 0.75), ("c", 5)):
+        m.add_object(name, Box(), at(x))
+    for one, other in ((m, empty), (empty, m), (empty, empty)):
+        assert one.in_collision_other(other, return_names=True, return_data=True) == (False, set(), [])
+        assert one.in_collision_other(other) is False
+        assert one.min_distance_other(other, return_names=True) == (np.inf, None)
+    assert empty.in_collision_internal(return_names=True) == (False, set())
+    every = {(x, y) for x in "ab" for y in "ab"} | {("c", "c")}  # as FCL tells it
+    assert m.in_collision_other(m, return_names=True) == (True, every)
+    assert m.min_distance_other(m) == pytest.approx(-1) and m.min_distance_internal("c") == 3.25
+    alone = CollisionManager()
+    alone.add_object("a", Box())
+    assert alone.in_collision_other(alone) is True and alone.min_distance_internal("a") == np.inf
+
+
 def test_a_bar_through_a_plate():
     bar, plate = Box(), Box()
     bar.vertices, plate.vertices = bar.vertices * (1, 2, 10), plate.vertices * (8, 9, 2)
@@ -159,6 +176,35 @@ def test_the_deepest_of_all_overlaps():
         assert names == (first[depth.argmax()], second[depth.argmax()])
 
 
+def test_the_deepest_of_what_is_flush():
+    rng = np.random.default_rng(7)
+    found = {"deep": 0, "touching": 0, "apart": 0}
+    for _ in range(60):
+        spread = rng.choice((4, 9))
+        m, spots = CollisionManager(), rng.integers(-spread, spread + 1, (8, 3)) / 2
+        halves = rng.choice((0.25, 0.5, 1), 8)
+        assets = [m.add_object(i, Box(half), at(*spot)) for i, (half, spot) in enumerate(zip(halves, spots))]
+        told = {}
+        for i, j in itertools.combinations(range(8), 2):
+            def ask(aside):
+                pose = np.array([1, 0, 0, 0, *(spots[j] + 2 * halves[i] * aside * np.array((0.36, 0.48, 0.8)))])
+                return ist.penetration(assets[i], assets[j], pose, poses_a=[1, 0, 0, 0, *spots[i]], measure="exact")
+
+            if ask(0).volume > 0:
+                under, over = ask(-1e-9), ask(1e-9)
+                volume = (under.volume + over.volume) / 2
+                area = np.linalg.norm(under.force + over.force) / 2
+                told[i, j] = -min(volume / max(area, 1e-300), np.cbrt(volume))
+            else:
+                told[i, j] = np.linalg.norm(np.maximum(np.abs(spots[i] - spots[j]) - halves[i] - halves[j], 0))
+        least = min(told.values())
+        far, names, data = m.min_distance_internal(return_names=True, return_data=True)
+        assert far == data.distance == pytest.approx(least, rel=1e-12)
+        assert told[names] == pytest.approx(least, rel=1e-12)
+        found["deep" if least < 0 else "touching" if least == 0 else "apart"] += 1
+    assert min(found.values()) > 0
+
+
 def test_few_of_many_are_looked_at(monkeypatch):
     real, rooms = ist.Scene, []
     monkeypatch.setattr(ist, "Scene", lambda **settings: rooms.append(settings["max_pairs"]) or real(**settings))
@@ -177,6 +223,21 @@ def test_few_of_many_are_looked_at(monkeypatch):
     n = CollisionManager()
     n.add_object("far", Box(), at(0, 0, -1e6 - 3))
     assert m.min_distance_other(n, return_names=True) == (2, (500, "far"))
+
+
+def test_the_one_of_many_that_another_manager_meets():
+    m, n = CollisionManager(), CollisionManager()
+    m.add_object("a", Box())
+    for i in range(600):
+        n.add_object(i, Box(), at(3 * i + 3))
+    assert m.in_collision_other(n) is n.in_collision_other(m) is False
+    for i in (0, 63, 64, 575, 576, 599):
+        n.set_transform(i, at(0.5))
+        assert m.in_collision_other(n) is n.in_collision_other(m) is True
+        assert m.in_collision_other(n, return_names=True) == (True, {("a", i)})
+        n.set_transform(i, at(0, 3))
+        assert m.in_collision_other(n) is False and m.min_distance_other(n, return_names=True) == (2, ("a", i))
+        n.remove_object(i)
 
 
 def test_what_a_scene_refuses_is_raised(monkeypatch):
