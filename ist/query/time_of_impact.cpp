@@ -87,6 +87,8 @@ PlaneBetween plane_between(const Sampler& shape, const ConvexPiece& triangle) no
     if (best.apart >= kEnough * best.distance) break;
     const bool nearer = between.add(difference, triangle.corner[nearest]);
     if (!nearer && i > 0) break;
+    // No point is nearer than a plane has shown, but for rounding.
+    if (best.apart > 0 && between.shortest().norm() - radius < (1 - 1e-9) * best.apart) break;
     across = between.shortest();
     best.point = between.point();
   }
@@ -237,7 +239,7 @@ class ShapeSearch {
     const bool near = part.gap <= kReported * loop_.tolerance;
     if (part.gap > 0 && loop_.advances(part.step) &&
         (!near || !(part.rate > 0) || !(at.time + part.step < loop_.end)))
-      return loop_.clear_for(part.step, cuts, node.bits(), half_left(part.gap));
+      return loop_.clear_for(part.step, cuts, node.bits(), gap_left(part.gap, loop_.tolerance));
     ImpactFound found;
     found.gap = part.gap;
     found.distance = part.distance;
@@ -248,7 +250,6 @@ class ShapeSearch {
     found.point_a = part.point - std::max(0.0, part.distance) * part.normal;
     loop_.found(found);
   }
-  double half_left(double gap) const noexcept { return std::min(loop_.tolerance, gap) / 2; }
 
   void visit_sphere(NodeKey node, const Placement& at) noexcept {
     loop_.count_surface_pair();
@@ -258,8 +259,9 @@ class ShapeSearch {
     const double r = -frame_.b.unit * piece.behind;
     if (at.time == 0 && seen.distance <= r) return overlap_at(point.place);
     const double gap = seen.distance - point.radius - margin(at);
-    decide({gap, seen.distance - r + margin(at), ball_step(gap - half_left(gap), seen, point),
-            rate(seen.normal, point), point.place - r * seen.normal, seen.normal},
+    decide({gap, seen.distance - r + margin(at),
+            ball_step(gap - gap_left(gap, loop_.tolerance), seen, point), rate(seen.normal, point),
+            point.place - r * seen.normal, seen.normal},
            0, node, at);
   }
 
@@ -288,7 +290,7 @@ class ShapeSearch {
       turning = std::max(turning, -normal.dot(c.velocity));
       nearing = std::max(nearing, rate(normal, c));
     }
-    const double more = gap - half_left(gap);
+    const double more = gap - gap_left(gap, loop_.tolerance);
     const double step = frame_.a.spin_speed == 0
                             ? clear_step(frame_, normal, more, turning, 0, fastest.velocity.norm())
                             : any_step(more, fastest, arm);
@@ -316,8 +318,9 @@ class ShapeSearch {
         loop_.visit_again(TrianglePart::quarter(part, i), node.bits());
       return;
     }
-    decide({gap, seen.distance + error + margin(at), ball_step(gap - half_left(gap), seen, point),
-            rate(seen.normal, point), point.place, seen.normal},
+    decide({gap, seen.distance + error + margin(at),
+            ball_step(gap - gap_left(gap, loop_.tolerance), seen, point), rate(seen.normal, point),
+            point.place, seen.normal},
            part, node, at);
   }
 

@@ -210,7 +210,9 @@ struct Scene::Impl : SceneBodies {
       p = ist::penetration(solid_a, solid_b, rule.penetration, workspace);
     }
     two.meet = p.status != QueryStatus::ok || p.volume > 0 || p.touching;
-    if (rule.margin > 0 && (std::isnan(p.volume) || p.volume == 0)) {
+    // Matched spheres protrude.
+    if (rule.margin > 0 &&
+        (rule.penetration.measure == Measure::matched || std::isnan(p.volume) || p.volume == 0)) {
       s = ist::separation(solid_a, solid_b, {.max_distance = rule.margin}, workspace);
       two.meet = two.meet || s.status != QueryStatus::ok || s.distance_min < rule.margin;
     }

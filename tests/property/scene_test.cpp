@@ -237,7 +237,8 @@ class AllPairs {
     }
     bool meet = out.penetration.touching || out.penetration.status != QueryStatus::ok ||
                 out.penetration.volume > 0;
-    if (rule.margin > 0 && (std::isnan(out.penetration.volume) || out.penetration.volume == 0)) {
+    if (rule.margin > 0 && (rule.penetration.measure == Measure::matched ||
+                            std::isnan(out.penetration.volume) || out.penetration.volume == 0)) {
       SeparationSettings limits;
       limits.max_distance = rule.margin;
       out.separation = separation(a.solid, b.solid, limits, workspace_);
@@ -408,6 +409,24 @@ TEST(Scene, BoxesOfAllSizesMeetWhereTheirNumbersSay) {
     }
   }
   EXPECT_GT(met, 10'000u);
+}
+
+TEST(Scene, ProtrudingSpheresAreNoOverlap) {
+  const Asset cube = testing::baked(testing::cube_mesh(), "cube", 300);
+  Scene scene;
+  SceneRule rule;
+  rule.margin = 0.5;
+  scene.set_rule(0, 0, rule);
+  for (std::uint32_t number : {0u, 1u}) {
+    SceneBody body;
+    body.number = number;
+    body.solid = PlacedSolid(cube.view(), Pose{{1, 0, 0, 0}, {1.001 * number, 0, 0}});
+    scene.add(body);
+  }
+  const SceneStep step = scene.step();
+  ASSERT_EQ(step.pairs.size(), 1u);
+  EXPECT_GT(scene.penetration(step.pairs[0]).volume, 0);
+  EXPECT_NEAR(scene.separation(step.pairs[0]).distance, 0.001, 1e-9);
 }
 
 TEST(Scene, TouchingBlocksMeetAndApartOnesComeWithinTheMargin) {

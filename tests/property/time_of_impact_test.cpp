@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "support/impact_bodies.h"
+#include "support/random_pairs.h"
 
 // Times of impact against closed forms, against all pairs of triangles at many times of the motion,
 // and at speeds at which no step would find the wall.
@@ -89,6 +90,42 @@ TEST(TimeOfImpact, OfASpinningRodAndAWall) {
                      {{}, {Vector3d::Zero(), {0, 0, 1}, Vector3d::Zero()}}, settings, workspace());
   EXPECT_EQ(clear.kind, ImpactKind::no_impact);
   EXPECT_EQ(clear.time, settings.duration);
+}
+
+/// A torus turned anyhow, its lowest corner above the level face of a shape: many points of the
+/// face support one direction.
+TEST(TimeOfImpact, OfCornersAboveLevelFaces) {
+  RandomPairs random(12);
+  const Shape shapes[] = {BoxShape{{1, 1, 1}}, BoxShape{{1, 1, 0.01}}, CylinderShape{2, 1},
+                          CylinderShape{2, 0.01}};
+  const std::vector<Vector3d> corners = torus_mesh(0.5, 0.15, 24, 12).vertices;
+  ImpactSettings settings;
+  settings.tolerance = 1e-3;
+  for (int i = 0; i < 2000; ++i) {
+    const Shape& shape = shapes[i % 4];
+    const double top = i % 2 == 0 ? 1 : 0.01, gap = std::pow(10, random.uniform(-5, 0));
+    Pose pose = random.pose(0.3);
+    const Eigen::Matrix3d turn = unit_rotation(pose).toRotationMatrix();
+    double low = 0;
+    for (const Vector3d& corner : corners) low = std::min(low, (turn * corner).z());
+    pose.t[2] = top + gap - low;
+    const PlacedShape floor{shape, {}, 1};
+    for (const double speed : {0.0, 5.0})
+      EXPECT_EQ(time_of_impact(floor, {torus().view(), pose, 1}, {{}, straight({0, 0, speed})},
+                               settings, workspace())
+                    .kind,
+                ImpactKind::no_impact)
+          << i << ' ' << gap;
+    pose.t[2] += 3;
+    const TimeOfImpact found =
+        time_of_impact(floor, {torus().view(), pose, 1}, {{}, straight({0, 0, -3 - 2 * gap})},
+                       settings, workspace());
+    EXPECT_EQ(found.kind, ImpactKind::impact) << i;
+    const double left = gap + 3 - found.time * (3 + 2 * gap);
+    EXPECT_GE(left, settings.tolerance / 2 * (1 - 1e-9)) << i;
+    EXPECT_LE(found.distance_min, left * (1 + 1e-9)) << i;
+    EXPECT_GE(found.distance_max, left * (1 - 1e-9)) << i;
+  }
 }
 
 TEST(TimeOfImpact, OfPrimitives) {

@@ -36,11 +36,24 @@ double nearest_part(const Vector3d& a, const Vector3d& b) noexcept {
   return uu > 0 ? std::clamp(-u.dot(a) / uu, 0.0, 1.0) : 0.0;
 }
 
-/// True if x and the origin lie on one side of a triangle.
-bool same_side(const Vector3d& a, const Vector3d& b, const Vector3d& c,
-               const Vector3d& x) noexcept {
+/// True if x and the origin lie on one side of a triangle, x further from it than `noise` over the
+/// triangle's area.
+bool same_side(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& x,
+               double noise) noexcept {
   const Vector3d n = (b - a).cross(c - a);
-  return (n.dot(x - a) > 0) == (n.dot(a) < 0);
+  const double height = n.dot(x - a);
+  return std::fabs(height) > noise && (height > 0) == (n.dot(a) < 0);
+}
+
+/// Bounds the error of a tetrahedron's volume from rounded corners. The four points at which faces
+/// or circles support a direction lie in one plane but for it.
+double volume_noise(const Vector3d (&x)[4]) noexcept {
+  double far2 = 0, edge2 = 0;
+  for (int i = 0; i < 4; ++i) {
+    far2 = std::max(far2, x[i].squaredNorm());
+    for (int j = 0; j < i; ++j) edge2 = std::max(edge2, (x[i] - x[j]).squaredNorm());
+  }
+  return 1e-13 * std::sqrt(far2) * edge2;
 }
 
 void keep_nearer(NearestPoints& best, double& best2, const Vector3d& a,
@@ -92,11 +105,12 @@ bool GjkDistance::add(const Vector3d& difference, const Vector3d& of_b) noexcept
   } else if (count_ >= 3) {
     double least = std::numeric_limits<double>::infinity();
     bool around = count_ == 4;
+    const double noise = around ? volume_noise(difference_) : 0;
     for (int left_out = count_ == 4 ? 0 : 3; left_out < 4; ++left_out) {
       const int i = left_out == 0 ? 1 : 0, j = left_out <= 1 ? 2 : 1, k = left_out <= 2 ? 3 : 2;
       const Vector3d parts = nearest_parts(x[i], x[j], x[k]);
       const double d2 = (parts[0] * x[i] + parts[1] * x[j] + parts[2] * x[k]).squaredNorm();
-      around = around && same_side(x[i], x[j], x[k], x[left_out]);
+      around = around && same_side(x[i], x[j], x[k], x[left_out], noise);
       if (!(d2 < least)) continue;
       least = d2;
       part[i] = parts[0], part[j] = parts[1], part[k] = parts[2];

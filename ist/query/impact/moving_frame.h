@@ -89,6 +89,11 @@ inline constexpr double kFarApart = 0.05;
 // tolerance, so that none is too short to advance.
 inline constexpr double kReported = 0.75;
 
+/// What a step leaves of a pair's gap: half of the tolerance, or of a gap that may be reported.
+inline double gap_left(double gap, double tolerance) noexcept {
+  return (gap > kReported * tolerance ? tolerance : gap) / 2;
+}
+
 /// The outcome of a pair, in the frame's unit of length.
 struct ImpactFound {
   ImpactKind kind = ImpactKind::no_impact;

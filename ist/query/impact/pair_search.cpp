@@ -193,7 +193,7 @@ class PairSearch {
       for (int k = 0; k < a.shape.corners; ++k) fastest = std::max(fastest, n.dot(a.velocity[k]));
       for (int k = 0; k < b.shape.corners; ++k) slowest = std::min(slowest, n.dot(b.velocity[k]));
       plane.rate = fastest - slowest - n.dot(frame_.velocity);
-      const double left = std::min(loop_.tolerance, plane.gap) / 2;
+      const double left = gap_left(plane.gap, loop_.tolerance);
       plane.step = clear_step(frame_, n, plane.gap - left, fastest - slowest, a.fastest, b.fastest);
       if (!(best.step >= plane.step)) best = plane;
     };
@@ -213,7 +213,7 @@ class PairSearch {
     if (loop_.advances(best.step) &&
         (!near || !(best.rate > 0) || !(at.time + best.step < loop_.end)))
       return loop_.clear_for(best.step, key_a.bits(), key_b.bits(),
-                             std::min(loop_.tolerance, best.gap) / 2);
+                             gap_left(best.gap, loop_.tolerance));
     ImpactFound found;
     found.gap = widest.gap;
     found.distance = nearest.distance + a.shape.behind + b.shape.behind + at.error;
