@@ -60,8 +60,8 @@ class Fibers {
     static thread_local Fibers* current = nullptr;
     return current;
   }
-  // Not inlined: getcontext and setjmp return twice, and a caller's variables would not survive that.
-  // A jump makes no system call, as a switch of contexts does.
+  // Not inlined: getcontext and setjmp return twice, and a caller's variables would not survive
+  // that. A jump makes no system call, as a switch of contexts does.
   [[gnu::noinline]] void prepare(const int lane) {
     if (stack_[lane] == nullptr) stack_[lane] = std::make_unique<char[]>(kStackSize);
     started_[lane] = false;
