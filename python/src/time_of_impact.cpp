@@ -14,7 +14,7 @@ constexpr const char* kDoc =
 B moves from `poses` to `poses_to` in the time `duration`: the point `about` moves straight, and
 B rotates at constant speed about one axis, the shorter way. A rests at `poses_a`, or moves to `poses_a_to`.
 
-poses, poses_to: (7,) or (n, 7), as for penetration().
+poses, poses_to: (7,) or (n, 7), as for penetration(); either of one row applies to all rows.
 about, about_a: (3,) [u] in the object's own frame, before its scale: its centre of mass for a free
     body.
 duration: [T] > 0. tolerance: [u]; 0: a thousandth of the smaller bounding radius.
