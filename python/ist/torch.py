@@ -140,7 +140,7 @@ def _times(slope, gradient):
 
 
 class _Once(torch.autograd.Function):
-    """Gradients whose own gradient, by what they follow from, is an error instead of 0."""
+    """A gradient that raises when it is differentiated in turn."""
 
     @staticmethod
     def forward(ctx, gradient, *of):

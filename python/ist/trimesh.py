@@ -271,7 +271,7 @@ class CollisionManager:
         return self._scene
 
     def _near(self, others, rows, margin=0, itself=True):
-        """As _within(), of objects of this manager and of others in these rows, be it one `itself`."""
+        """As _within(), of objects of this manager and of others in these rows. itself: an object is near itself."""
         if self._moved:
             self._within()
         rows = np.array(rows, int)

@@ -95,9 +95,8 @@ struct Deepest {
   Eigen::Vector3d force{0, 0, 0}, centroid{0, 0, 0};  ///< on B
   QueryStatus status = QueryStatus::ok;               ///< else of `row`, which stopped it
 
-  /// Asks one more row, of bound nearness(). Where faces are flush beside an overlap its slope
-  /// jumps, and the mean of both sides is that of neither face: it is asked with B aside by `way`,
-  /// in sizes of A, and by −way.
+  /// Takes one more row. Where faces are flush beside an overlap, the slope of its volume jumps:
+  /// the overlap is the mean of two queries, with B moved by `way`, in sizes of A, and by −way.
   void ask(const Row& given, std::int64_t number, const Eigen::Vector3d& way,
            Workspace& workspace) {
     const Bounds own = bounds(*given.a.tree());

@@ -115,10 +115,11 @@ Doubles take_poses(const py::handle& value, const char* name, const std::string&
 /// From (7,) or (4, 4); None: at the origin. Refuses poses and scales that queries reject.
 Pose take_pose(const py::object& pose, double scale, const std::string& name = "pose");
 
+using AnswerRow = std::function<void(std::size_t, Workspace&)>;
 /// Calls answer(i, workspace) for each i below `count`, on `threads` threads (0: all cores), with
 /// the GIL released. Ctrl-C ends it: KeyboardInterrupt.
-using AnswerRow = std::function<void(std::size_t, Workspace&)>;
 void for_each_of(std::size_t count, unsigned threads, const AnswerRow& answer);
+/// The same for each row, in the order of Rows::asked().
 void for_each_row(const Rows& rows, unsigned threads, const AnswerRow& answer);
 
 }  // namespace ist::python

@@ -92,8 +92,8 @@ TEST(TimeOfImpact, OfASpinningRodAndAWall) {
   EXPECT_EQ(clear.time, settings.duration);
 }
 
-/// A torus turned anyhow, its lowest corner above the level face of a shape: many points of the
-/// face support one direction.
+/// A torus turned anyhow or by right angles, there coaxial, its lowest corner above the level face
+/// of a shape: many points of the face support one direction.
 TEST(TimeOfImpact, OfCornersAboveLevelFaces) {
   RandomPairs random(12);
   const Shape shapes[] = {BoxShape{{1, 1, 1}}, BoxShape{{1, 1, 0.01}}, CylinderShape{2, 1},
@@ -105,6 +105,10 @@ TEST(TimeOfImpact, OfCornersAboveLevelFaces) {
     const Shape& shape = shapes[i % 4];
     const double top = i % 2 == 0 ? 1 : 0.01, gap = std::pow(10, random.uniform(-5, 0));
     Pose pose = random.pose(0.3);
+    if (i % 8 >= 4) {
+      pose = {{1, 0, 0, 0}, {0, 0, 0}};
+      pose.q[1 + i / 8 % 3] = i / 24 % 3 - 1;
+    }
     const Eigen::Matrix3d turn = unit_rotation(pose).toRotationMatrix();
     double low = 0;
     for (const Vector3d& corner : corners) low = std::min(low, (turn * corner).z());
